@@ -23,7 +23,9 @@ from fluxtrue_tools.sim.motor import Motor
 
 MACHINES = [("saturated", 12), ("pmasynrm", 13), ("hsm1", 16)]
 MAP_RMS, R_SHARE, OFFSET_SHARE, BALANCE = 0.01, 0.01, 0.001, 0.002
-DRAWS, DRAW_RMS = (72, 240, 294), 0.005  # the worst of 300 positions of the rotor and noises of the first machine
+# Machine, seed, number of the position of the rotor and noise: the worst of 300; two with a phase near zero current.
+DRAWS = [("saturated", 12, 72), ("saturated", 12, 240), ("saturated", 12, 294), ("hsm1", 135, 0), ("hsm1", 135, 6)]
+DRAW_RMS = 0.005
 # The winding drops 1.2 V at the largest current; a phase current is near zero at every level; large swings.
 LITTLE_VOLTAGE = [("saturated", 126), ("linear", 138), ("hsm1", 105)]
 R_LEFT, LEG_V = 0.004, 0.05  # beyond the sensors' gains; 5 mV of 1.2 V; a half per cent of what a leg loses
@@ -49,11 +51,12 @@ def test_map_and_resistance_of_a_hidden_machine(name: str, seed: int, unknown: M
     assert drive.get("fault_word") == 0.0
 
 
-@pytest.mark.parametrize("number", DRAWS)
-def test_noise_does_not_choose_the_smoothing_of_the_map(number: int, unknown: Motor, known: Nameplate) -> None:
+@pytest.mark.parametrize(("name", "seed", "number"), DRAWS)
+def test_noise_does_not_choose_the_map(name: str, seed: int, number: int, unknown: Motor, known: Nameplate) -> None:
     """With weights that grow towards small currents, where a sample's error is largest, the score of the smoothing is
-    flat, the noise chooses among its candidates, and these three maps are wrong by 0.76 to 0.78 %."""
-    truth, flux_map, plant = hidden.draw(*MACHINES[0], unknown, known.i_max_A)
+    flat, the noise chooses among its candidates, and the first three maps are wrong by 0.76 to 0.78 %. Without the
+    common errors of the samples after an uncertain sign the last two are wrong by 0.76 and 0.78 %."""
+    truth, flux_map, plant = hidden.draw(name, seed, unknown, known.i_max_A)
     rng = np.random.default_rng([number, 77])
     drawn = {"seed": float(rng.integers(1, 1 << 40)), "theta_m_rad": float(rng.uniform(0.0, 2.0 * np.pi))}
     drive = SoftwareInTheLoop(Loop(unknown.library, plant | drawn, flux_map))

@@ -5,6 +5,7 @@ The three phase currents sum to zero. Apart from its offset, the sum of the sens
 of their gains, not the gain that all three have in common.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -22,6 +23,7 @@ class Balance:
 
     vector: complex  # a third of their sum, each along the axis of its phase
     sigma: float  # of a phase's gain
+    noise_A: float  # of one component of a sample's current
 
     @property
     def gains(self) -> Array:
@@ -43,4 +45,7 @@ def measure(raws: Sequence[Raw]) -> Balance:
     left = zero - matrix @ x
     covariance = np.linalg.inv(matrix.T @ matrix) * float(left @ left) / (len(zero) - len(x))
     worst = float(np.sqrt(np.linalg.eigvalsh(covariance[:2, :2]).max()))
-    return Balance(complex(x[0], x[1]), 2.0 * worst)
+    noise_A = math.sqrt(
+        2.0 * float(left @ left) / (len(zero) - len(x))
+    )  # of the mean of three: a third of the variance
+    return Balance(complex(x[0], x[1]), 2.0 * worst, noise_A)

@@ -179,16 +179,21 @@ def _legs(i_s: Array, knee_A: float) -> Array:
     return total
 
 
+def mean_sign(begins: Array, ends: Array) -> Array:
+    """Of currents that change along straight lines from begins to ends: (CM-25)."""
+    change = ends - begins
+    return np.where(
+        change == 0.0, np.sign(ends), (np.abs(ends) - np.abs(begins)) / np.where(change == 0.0, 1.0, change)
+    )
+
+
 def _signs(i_s: Array) -> Array:
-    """The vector of three legs whose voltages are the signs of their currents: means over each period, in which the
-    currents change along straight lines. The mean of a sign from a to b is (|b| - |a|)/(b - a)."""
+    """The vector of three legs whose voltages are the signs of their currents: means over each period."""
     total = np.zeros(len(i_s) - 1, complex)
     for k in range(3):
         axis = np.exp(2j * np.pi * k / 3.0)
         i = (i_s * np.conj(axis)).real
-        change = np.diff(i)
-        means = np.where(change == 0.0, np.sign(i[1:]), np.diff(np.abs(i)) / np.where(change == 0.0, 1.0, change))
-        total += 2.0 / 3.0 * axis * means
+        total += 2.0 / 3.0 * axis * mean_sign(i[:-1], i[1:])
     return total
 
 

@@ -64,11 +64,11 @@ def errors(found: Found, truth: hidden.Truth, i_max_A: float) -> dict[str, float
     """What the commissioning itself missed, beside the torque."""
     assert found.surface is not None and found.resistance is not None and found.balance is not None
     assert found.spun is not None
-    at = turned(found, truth)
+    at, model = turned(found, truth), found.surface.with_magnet(found.spun.psi_f_Vs)
     reached = score(found.surface.model, truth, i_max_A, truth.psi_f_Vs)
     return {"is_connected": float(at.is_connected), "map_rms": reached.map_rms,
             "r_error": resistance_error(found.resistance.r_ohm, truth)[0],
-            "iron": iron_error(iron.measure(found.spun, found.surface.model, i_max_A), truth),
+            "iron": iron_error(iron.measure(found.spun, model, i_max_A), truth),
             "balance": balance_error(found.balance, truth), "offset_deg": at.offset_deg, "psi_f_error": at.psi_f,
             "lag_us": 1e6 * found.spun.lag_s, "drag_error": at.drag, "inertia_error": at.inertia}  # fmt: skip
 

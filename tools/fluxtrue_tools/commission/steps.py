@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from fluxtrue_tools.commission import balance, bus_turning, connection, drag, levels, plan, spin, surface, turning
 from fluxtrue_tools.commission.balance import Balance
-from fluxtrue_tools.commission.bursts import FAILURES, Raw, integrate, offset
+from fluxtrue_tools.commission.bursts import FAILURES, Raw, offset
 from fluxtrue_tools.commission.bus import OverTheBus
 from fluxtrue_tools.commission.connection import Followed
 from fluxtrue_tools.commission.drag import Drag
@@ -157,9 +157,10 @@ def _map(drive: Capture, found: Found, known: Nameplate) -> None:
     if len(lost) > plan.LOST_MAX:
         raise FluxtrueError(f"commission: map: {len(lost)} of {len(found.bursts)} bursts failed: {lost[0]}")
     found.balance = balance.measure([*found.levels, *used])
-    linkages = [integrate(found.balance.corrected(raw), found.resistance.r_ohm) for raw in used]
-    found.surface = surface.fit(linkages, known.i_max_A, found.resistance.r_ohm, known.psi_f_Vs,
-                                found.resistance.total_V)  # fmt: skip
+    alike = [found.balance.corrected(raw) for raw in used]
+    error = surface.MEASURED if found.spun is not None else surface.GIVEN if known.psi_f_source else surface.GUESSED
+    found.surface = surface.fit(alike, found.balance.noise_A, known.i_max_A, found.resistance.r_ohm,
+                                (known.psi_f_Vs, error), found.resistance.total_V)  # fmt: skip
 
 
 STEPS = (

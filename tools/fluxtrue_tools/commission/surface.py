@@ -7,23 +7,25 @@ leg of the inverter loses, and the flux linkage at the start of each burst: whil
 voltage of a leg is unknown.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from fluxtrue_tools.commission.bursts import Linkage
+from fluxtrue_tools.commission.bursts import Linkage, Raw, integrate
+from fluxtrue_tools.commission.noise import Noise, of_signs
 from fluxtrue_tools.motor.flux_model import Array, FluxModel
 from fluxtrue_tools.motor.map_import.coenergy import Basis, CoEnergy, System
 
 INTERVALS = 16  # over the longer side of the plane
 MARGIN_D = 0.15  # of i_max on the magnetising side
-KNOWN = 0.1  # weight of what the voltages cannot show: the energy without current, the magnet's flux linkage
-STEADY = 0.5  # of i_max: a sample's error falls with the current as 1/(STEADY + i)
-ERROR = 0.05  # of psi, rms: a weighted sample's, against which the other errors are weighed
-R_PRIOR, LEVEL_PRIOR_V, START_PRIOR = 0.005, 0.1, 0.05  # of R; volts; of the scale of psi
+MEASURED, GIVEN, GUESSED = 0.01, 0.1, 0.5  # errors of the magnet's flux linkage, by where it comes from
+ERROR, STEADY = 0.05, 0.5  # of psi, rms, and of i_max: until there is a map, a sample's error is ERROR/(STEADY + i)
+RESOLUTION = 0.001  # of psi, rms: error of a sample beside its noise
+R_PRIOR, LEVEL_PRIOR_V, START_PRIOR = 0.002, 0.1, 0.05  # of R; volts; of psi, rms
+PRICE, LEAST = 1.4, 0.01  # of an unknown in the score of the smoothing; the least smoothing
 
 
 @dataclass(frozen=True)
@@ -79,14 +81,15 @@ def _parts(values: Array) -> Array:
 class _Fit:
     """Rows of all bursts; the unknowns are scaled so that each is about 1."""
 
-    def __init__(self, bursts: Sequence[Linkage], i_max_A: float, r_ohm: float) -> None:
-        self.bursts, self.i_max, self.r = bursts, i_max_A, r_ohm
-        self.basis = Basis(_plane(bursts, i_max_A), INTERVALS)
-        self.scale = float(np.sqrt(np.mean(np.concatenate([np.abs(b.psi) ** 2 for b in bursts]))))
+    def __init__(self, raws: Sequence[Raw], i_max_A: float, r_ohm: float) -> None:
+        self.raws, self.i_max, self.r = raws, i_max_A, r_ohm
+        self.bursts = [integrate(raw, r_ohm) for raw in raws]
+        self.basis = Basis(_plane(self.bursts, i_max_A), INTERVALS)
+        self.scale = float(np.sqrt(np.mean(np.concatenate([np.abs(b.psi) ** 2 for b in self.bursts]))))
         zero = np.zeros(1)
         self.magnet = self.basis.rows(zero, zero, 1, 0)
         self.zero = self.basis.rows(zero, zero, 0, 0)
-        self.others = 2 + 2 * len(bursts)
+        self.others = 2 + 2 * len(raws)
 
     def _energy(self, burst: Linkage) -> sparse.csr_matrix:
         """The slopes of the energy, without the magnet's flux at the start."""
@@ -106,45 +109,75 @@ class _Fit:
         columns[:, first + 1] = _parts(1j * burst.turned) * START_PRIOR * self.scale
         return -columns / self.scale
 
-    def rows(self, n: int) -> sparse.csr_matrix:
+    def rows(self, n: int) -> Array:
         """All unknowns of a burst's equations, per unit of scale."""
-        return sparse.hstack((self._energy(self.bursts[n]), sparse.csr_matrix(self._errors(n))), format="csr")
+        return np.hstack((self._energy(self.bursts[n]).toarray(), self._errors(n)))
 
-    def weights(self, n: int) -> Array:
-        """The inverse of a sample's error, which is largest where the legs' voltages are unknown: at small currents."""
-        one = STEADY + np.abs(self.bursts[n].i) / self.i_max
-        of_d, of_q = self.bursts[n].axes
-        return np.concatenate((of_d * one, of_q * one))
+    def values(self, n: int) -> Array:
+        """The flux linkages of a burst, per unit of scale."""
+        return _parts(self.bursts[n].psi) / self.scale
+
+    def energy(self, x: Array) -> CoEnergy:
+        """The energy of a solution."""
+        return CoEnergy(self.basis, x[: self.basis.count] * self.scale * self.i_max, self.i_max)
+
+    def _unused(self, n: int) -> Array:
+        """Infinite where an axis of a burst has no weight."""
+        with np.errstate(divide="ignore"):
+            return np.repeat(1.0 / np.array(self.bursts[n].axes), len(self.bursts[n].i))
+
+    def guessed_noise(self, n: int) -> Noise:
+        """Without a map: what is seen in many machines."""
+        one = ERROR / (STEADY + np.abs(self.bursts[n].i) / self.i_max)
+        return Noise(np.tile(one, 2) * self._unused(n), np.zeros((2 * len(one), 0)))
+
+    def noise(self, n: int, model: CoEnergy, level_V: float, noise_A: float) -> Noise:
+        """(CM-31)."""
+        i = self.bursts[n].i
+        slopes = model.psi_d(i.real, i.imag, nd=1), model.psi_d(i.real, i.imag, nq=1), model.psi_q(i.real, i.imag, nq=1)
+        sigma = np.concatenate([np.hypot(slopes[k], slopes[k + 1]) * noise_A / self.scale for k in range(2)])
+        of_legs = of_signs(self.raws[n], noise_A) * level_V / self.scale
+        return Noise(np.hypot(sigma, RESOLUTION) * self._unused(n), np.vstack((of_legs.real, of_legs.imag)))
+
+    def solve(self, noises: Iterable[Noise], magnet: tuple[float, float], level_V: float) -> tuple[float, Array]:
+        """Effective number of unknowns, and all of them; magnet: its flux linkage and the relative error of it."""
+        count = self.basis.count
+        system = System(count + self.others)
+        for n, noise in enumerate(noises):
+            system.add(noise.whitened(self.rows(n)), noise.whitened(self.values(n)[:, None])[:, 0])
+        psi_f, error = magnet[0] / self.scale, magnet[0] * magnet[1] / self.scale
+        for row, value in ((self.magnet, psi_f), (self.zero, 0.0)):
+            known = sparse.hstack((row, sparse.csr_matrix((1, self.others))), format="csr") / error
+            system.add(sparse.csr_matrix(known), np.array([value / error]), counted=False)
+        prior = sparse.hstack((sparse.csr_matrix((self.others, count)), sparse.eye(self.others)), format="csr")
+        centre = np.zeros(self.others)
+        centre[1] = level_V / LEVEL_PRIOR_V
+        system.add(prior, centre, counted=False)
+        penalty = np.zeros((count + self.others,) * 2)
+        penalty[:count, :count] = self.basis.penalty()
+        return system.solve(penalty, slack=1.0, price=PRICE, least=LEAST)
 
 
-def fit(bursts: Sequence[Linkage], i_max_A: float, r_ohm: float, psi_f_Vs: float, level_V: float) -> Surface:
-    """All unknowns at once; psi_f is that of the nameplate, or the one that the step spin has measured."""
-    work = _Fit(bursts, i_max_A, r_ohm)
-    others = work.others
-    system = System(work.basis.count + others)
-    values = [_parts(burst.psi) / work.scale for burst in bursts]
-    for n in range(len(bursts)):
-        weight = sparse.diags(work.weights(n))
-        system.add(sparse.csr_matrix(weight @ work.rows(n)), weight @ values[n])
-    for row, value in ((work.magnet, psi_f_Vs / work.scale), (work.zero, 0.0)):
-        known = sparse.hstack((row, sparse.csr_matrix((1, others))), format="csr") * KNOWN
-        system.add(sparse.csr_matrix(known), np.array([KNOWN * value]), counted=False)
-    prior = sparse.hstack((sparse.csr_matrix((others, work.basis.count)), ERROR * sparse.eye(others)), format="csr")
-    centre = np.zeros(others)
-    centre[1] = level_V / LEVEL_PRIOR_V
-    system.add(prior, ERROR * centre, counted=False)
-    penalty = np.zeros((work.basis.count + others,) * 2)
-    penalty[: work.basis.count, : work.basis.count] = work.basis.penalty()
-    unknowns, x = system.solve(penalty, slack=1.0)
-    return _surface(work, x, values, unknowns)
+def fit(raws: Sequence[Raw], noise_A: float, i_max_A: float, r_ohm: float, magnet: tuple[float, float],
+        level_V: float) -> Surface:  # fmt: skip
+    """All unknowns at once, twice: the first map says how much flux linkage the noise of a current is.
+
+    noise_A   of one component of a sample's current
+    magnet    its flux linkage, V·s, and the relative error of it
+    """
+    work = _Fit(raws, i_max_A, r_ohm)
+    bursts = range(len(raws))
+    _, x = work.solve((work.guessed_noise(n) for n in bursts), magnet, level_V)
+    model = work.energy(x)
+    unknowns, x = work.solve((work.noise(n, model, level_V, noise_A) for n in bursts), magnet, level_V)
+    return _surface(work, x, unknowns)
 
 
-def _surface(work: _Fit, x: Array, values: list[Array], unknowns: float) -> Surface:
-    count = work.basis.count
+def _surface(work: _Fit, x: Array, unknowns: float) -> Surface:
     left, psi = [], []
-    model = CoEnergy(work.basis, x[:count] * work.scale * work.i_max, work.i_max)
+    model, count = work.energy(x), work.basis.count
     for n, burst in enumerate(work.bursts):
-        rest = (values[n] - work.rows(n) @ x) * work.scale
+        rest = (work.values(n) - work.rows(n) @ x) * work.scale
         half = len(burst.i)
         left.append(rest[:half] + 1j * rest[half:])
         psi.append(model.psi_d(burst.i.real, burst.i.imag) + 1j * model.psi_q(burst.i.real, burst.i.imag) + left[-1])

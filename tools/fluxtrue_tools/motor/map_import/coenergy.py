@@ -126,16 +126,23 @@ class System:
         self.matrix, self.right = np.zeros((count, count)), np.zeros(count)
         self.power, self.total = 0.0, 0
 
-    def add(self, rows: sparse.csr_matrix, values: Array, counted: bool = True) -> None:
+    def add(self, rows: sparse.csr_matrix | Array, values: Array, counted: bool = True) -> None:
         """Some more equations; those that follow from others do not count."""
-        self.matrix += (rows.T @ rows).toarray()
+        squares = rows.T @ rows
+        self.matrix += squares.toarray() if sparse.issparse(squares) else squares
         self.right += rows.T @ values
         self.power += float(values @ values)
         self.total += len(values) if counted else 0
 
-    def solve(self, penalty: Array, slack: float = SCORE_SLACK) -> tuple[float, Array]:
-        """Effective unknowns and solution, with the smoothing that generalised cross-validation chooses; slack: of its
-        score, for the least smoothing that is taken instead of the best."""
+    def solve(
+        self, penalty: Array, slack: float = SCORE_SLACK, price: float = 1.0, least: float = 0.0
+    ) -> tuple[float, Array]:
+        """Effective unknowns and solution, with the smoothing that generalised cross-validation chooses.
+
+        slack   of its score, for the least smoothing that is taken instead of the best
+        price   of an effective unknown in the score, in equations
+        least   smoothing that is a candidate
+        """
         penalty = penalty * (np.trace(self.matrix) / np.trace(penalty))
         size = len(self.matrix)
         base = self.matrix + MIDDLE * penalty + FLOOR * np.trace(self.matrix) / size * np.eye(size)
@@ -144,14 +151,14 @@ class System:
         stiffness, modes = eigh(solve_triangular(lower, half.T, lower=True))
         modes = solve_triangular(lower, modes, lower=True, trans="T")  # base = identity, penalty = stiffness
         loads, found = modes.T @ self.right, []
-        for smoothing in SMOOTHING:
+        for smoothing in SMOOTHING[least <= SMOOTHING]:
             gains = 1.0 / np.maximum(1.0 + (smoothing - MIDDLE) * stiffness, FLOOR)
             x = modes @ (gains * loads)
             unknowns = float(np.sum(gains * np.maximum(1.0 - MIDDLE * stiffness, 0.0)))
             error = max(self.power - float(2.0 * x @ self.right - x @ self.matrix @ x), 0.0) + NOISE_MIN**2 * self.power
-            found.append((error / max(self.total - unknowns, 1.0) ** 2, unknowns, x))
-        least = min(score for score, _, _ in found)
-        return next((unknowns, x) for score, unknowns, x in found if score <= slack * least)
+            found.append((error / max(self.total - price * unknowns, 1.0) ** 2, unknowns, x))
+        best = min(score for score, _, _ in found)
+        return next((unknowns, x) for score, unknowns, x in found if score <= slack * best)
 
 
 class CoEnergy:

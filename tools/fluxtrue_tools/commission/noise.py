@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Errors of the samples of a burst: (CM-31), (CM-32).
+
+The noise of a current is one sample's own. Where a phase current is so small that noise hides its sign, the voltage of
+its leg is uncertain for a period, and all later flux linkages of the burst contain the same error.
+"""
+
+import numpy as np
+
+from fluxtrue_tools.commission.bursts import Raw, mean_sign
+from fluxtrue_tools.motor.flux_model import Array
+
+NODES, SHARES = np.polynomial.hermite_e.hermegauss(5)  # of a normal distribution
+CERTAIN = 1e-3  # variance of a sign that is known
+
+
+def sign_variance(i: Array, noise_A: float) -> Array:
+    """Of the mean sign of each period between two samples of a current, each with its own noise."""
+    begins = i[:-1, None, None] + noise_A * NODES[:, None]
+    ends = i[1:, None, None] + noise_A * NODES
+    signs, shares = mean_sign(begins, ends), np.outer(SHARES, SHARES) / SHARES.sum() ** 2
+    means = np.sum(shares * signs, axis=(1, 2))
+    return np.asarray(np.sum(shares * signs**2, axis=(1, 2)) - means**2)
+
+
+def of_signs(raw: Raw, noise_A: float) -> Array:
+    """Change of psi, per volt that a leg loses, by one standard deviation of each uncertain sign; a column for each."""
+    i_s, back = raw.i * np.exp(1j * raw.theta), np.exp(-1j * raw.theta)
+    columns = [np.zeros((len(i_s), 0), complex)]
+    for k in range(3):
+        axis = np.exp(2j * np.pi * k / 3.0)
+        variance = sign_variance((i_s * np.conj(axis)).real, noise_A)
+        at = np.flatnonzero(variance > CERTAIN)
+        since = np.arange(len(i_s))[:, None] > at
+        columns.append(2.0 / 3.0 * axis * raw.period_s * np.sqrt(variance[at]) * since * back[:, None])
+    return np.hstack(columns)
+
+
+class Noise:
+    """Standard deviation of each equation, and errors that several have in common; an infinite one: not used."""
+
+    def __init__(self, sigma: Array, common: Array) -> None:
+        self._used = np.isfinite(sigma)
+        self._sigma = sigma[self._used, None]
+        self._along, sizes, _ = np.linalg.svd(common[self._used] / self._sigma, full_matrices=False)
+        self._less = 1.0 - 1.0 / np.sqrt(1.0 + sizes[:, None] ** 2)
+
+    def whitened(self, rows: Array) -> Array:
+        """Equations whose errors are independent and have a variance of one: (CM-32)."""
+        own = rows[self._used] / self._sigma
+        return np.asarray(own - self._along @ (self._less * (self._along.T @ own)))
