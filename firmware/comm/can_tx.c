@@ -36,22 +36,27 @@ static bool is_due(const can_tx_t *tx, const tx_message_t *message)
     return time_ms % message->cycle_ms < tx->passed_ms;
 }
 
+bool can_tx_due(can_tx_t *tx)
+{
+    while (tx->next < MESSAGES && !is_due(tx, &messages[tx->next])) {
+        tx->next++;
+    }
+    return tx->next < MESSAGES;
+}
+
 tx_result_t can_tx_next(can_tx_t *tx, const telemetry_t *telemetry, can_frame_t *frame)
 {
-    while (tx->next < MESSAGES) {
-        const tx_message_t *message = &messages[tx->next];
-        tx->next++;
-        if (!is_due(tx, message)) {
-            continue;
-        }
-        *frame = (can_frame_t){.id = message->id, .length = MESSAGE_LENGTH};
-        if (!message->encode(telemetry, frame->data)) {
-            return TX_NOT_A_NUMBER;
-        }
-        if (message->data_id != 0U) {
-            e2e_protect(message->data_id, &tx->counter[message - messages], frame);
-        }
-        return TX_FRAME;
+    if (!can_tx_due(tx)) {
+        return TX_NONE;
     }
-    return TX_NONE;
+    const tx_message_t *message = &messages[tx->next];
+    tx->next++;
+    *frame = (can_frame_t){.id = message->id, .length = MESSAGE_LENGTH};
+    if (!message->encode(telemetry, frame->data)) {
+        return TX_NOT_A_NUMBER;
+    }
+    if (message->data_id != 0U) {
+        e2e_protect(message->data_id, &tx->counter[message - messages], frame);
+    }
+    return TX_FRAME;
 }

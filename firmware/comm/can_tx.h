@@ -25,6 +25,8 @@ typedef struct {
 } can_tx_t;
 
 void can_tx_begin(can_tx_t *tx, uint32_t passed_ms);
+/** Whether can_tx_next() will return a frame; it may be asked at any time in between. */
+bool can_tx_due(can_tx_t *tx);
 tx_result_t can_tx_next(can_tx_t *tx, const telemetry_t *telemetry, can_frame_t *frame);
 
 #endif

@@ -6,7 +6,7 @@ void before_reset(const drive_t *drive, before_reset_t *before)
     const uint32_t faults = drive->fast.faults;
     *before = (before_reset_t){
         .speed = drive->task.safe_state.speed,
-        .v_dc = (q15_t)sample_box_read(&drive->samples).v_dc,
+        .v_dc = (q15_t)sample_box_last(&drive->samples)->v_dc,
         .psi_delta = drive->psi_d_error,
         .armed = drive->task.armed && (faults & FAULT_CONFIG) == 0U,
         .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,

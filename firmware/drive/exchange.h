@@ -133,6 +133,12 @@ static inline const sample_t *sample_box_at(const sample_box_t *box, uint32_t ge
     return &box->slot[generation % SAMPLE_SLOTS];
 }
 
+/* For one word of it: the fast ISR needs SAMPLE_SLOTS - 1 periods to come back to this slot. */
+static inline const sample_t *sample_box_last(const sample_box_t *box)
+{
+    return sample_box_at(box, box->generation);
+}
+
 static inline void window_box_write(window_box_t *box, const identify_window_t *window)
 {
     box->slot[(box->generation + 1U) & 1U] = *window;

@@ -186,17 +186,21 @@ static void service_watchdog(ecu_t *ecu)
     }
 }
 
+/* In four of ten steps no frame is due, and nothing is collected for one. */
 static void send_frames(ecu_t *ecu)
 {
     telemetry_t telemetry;
     can_frame_t frame;
+    can_tx_begin(&ecu->tx, ecu->clock.passed_ms);
+    if (!can_tx_due(&ecu->tx)) {
+        return;
+    }
     telemetry_read(&ecu->drive, &telemetry);
     ecu_telemetry(ecu, &telemetry);
     telemetry.diagnostics.lost_frames = hal_can_lost();
     telemetry.diagnostics.bus_off = hal_can_bus_off();
     telemetry.diagnostics.stack_unused_bytes = hal_system_stack_unused();
     telemetry.diagnostics.reset_cause = (uint32_t)hal_system_reset_cause();
-    can_tx_begin(&ecu->tx, ecu->clock.passed_ms);
     for (tx_result_t r = can_tx_next(&ecu->tx, &telemetry, &frame); r != TX_NONE;
          r = can_tx_next(&ecu->tx, &telemetry, &frame)) {
         if (r == TX_NOT_A_NUMBER || !hal_can_send(&frame)) {

@@ -26,6 +26,10 @@ static const struct {
     {DERATING_SPEED, DERATING_REASON_SPEED},
 };
 
+#define DERATING_WITH_REASON                                                                                         \
+    (DERATING_INVERTER | DERATING_WINDING | DERATING_SENSOR | DERATING_DC_LOW | DERATING_DC_HIGH | DERATING_POWER | \
+     DERATING_MAGNET | DERATING_SPEED)
+
 void ecu_watch(ecu_t *ecu)
 {
     liveness_t *liveness = &ecu->liveness;
@@ -98,6 +102,9 @@ static uint32_t derating_reason(const ecu_t *ecu)
 {
     if (are_limits_lost(ecu)) {
         return DERATING_REASON_BATTERY_LIMITS_LOST;
+    }
+    if ((ecu->drive.task.derating & DERATING_WITH_REASON) == 0U) {
+        return DERATING_REASON_NONE; /* the usual case, twice in a step */
     }
     for (unsigned n = 0; n < sizeof reasons / sizeof reasons[0]; n++) {
         if ((ecu->drive.task.derating & reasons[n].derating) != 0U) {
@@ -184,7 +191,7 @@ arbitrate_in_t ecu_arbitration(const ecu_t *ecu)
         .torque_requested = per_unit(ecu, command->torque_requested_Nm),
         .limit_drive = fx_clamp_q15(per_unit(ecu, command->limit_drive_Nm), 0, max),
         .limit_regen = fx_clamp_q15(per_unit(ecu, command->limit_regen_Nm), 0, max),
-        .omega = sample_box_read(&ecu->drive.samples).point.omega,
+        .omega = sample_box_last(&ecu->drive.samples)->point.omega,
         .run = supervisor_outputs[supervisor->state].run,
         .stop = !supervisor->enabled,
         .ramp_out = !ecu->rx.command_channel.alive || supervisor->faults != 0U,
@@ -198,7 +205,7 @@ static request_limit_t request_limit(const ecu_t *ecu)
     const bus_command_t *command = &ecu->rx.command;
     const float requested_Nm = command->torque_requested_Nm;
     const float magnitude_Nm = (requested_Nm < 0.0F) ? -requested_Nm : requested_Nm;
-    const q31_t omega = sample_box_read(&ecu->drive.samples).point.omega;
+    const q31_t omega = sample_box_last(&ecu->drive.samples)->point.omega;
     const bool braking = arbitrate_is_braking(&ecu->arbitration_config, omega, requested_Nm < 0.0F);
     const float half_count_Nm = 0.5F * ecu->drive.motor->bus_scales.torque_Nm; /* the bus rounds the rated torque */
     if (magnitude_Nm > ecu->drive.motor->torque_max_Nm + half_count_Nm) {

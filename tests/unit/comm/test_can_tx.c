@@ -45,6 +45,29 @@ static int place(uint32_t id)
     return 0;
 }
 
+/* Asked before each frame, or never: the same frames. */
+void test_a_frame_is_due_exactly_when_the_next_call_returns_one(void)
+{
+    can_tx_t asked = tx;
+    for (int ms = 1; ms <= RUN_MS; ms++) {
+        can_tx_begin(&tx, 1);
+        can_tx_begin(&asked, 1);
+        bool due;
+        do {
+            due = can_tx_due(&asked);
+            TEST_ASSERT_EQUAL(due, can_tx_due(&asked));
+            can_frame_t other = {0};
+            const tx_result_t result = can_tx_next(&tx, &telemetry, &frame);
+            TEST_ASSERT_EQUAL(due, result != TX_NONE);
+            TEST_ASSERT_EQUAL_INT(result, can_tx_next(&asked, &telemetry, &other));
+            if (due) {
+                TEST_ASSERT_EQUAL_UINT32(frame.id, other.id);
+                TEST_ASSERT_EQUAL_UINT8_ARRAY(frame.data, other.data, sizeof frame.data);
+            }
+        } while (due);
+    }
+}
+
 void test_every_message_comes_exactly_in_its_cycle_time(void)
 {
     int last[MESSAGES];
