@@ -12,11 +12,14 @@ still.tamper = (message) => {
   const told = arrive(message);
   if (told.type !== "rows") return told;
   const none = { state: "waiting", rows: [], refused: "", step_s: 0, number: 0 };
-  const card = (k) => ({ ...none, ...(k < ACTIVE ? { state: "accepted" } : k === ACTIVE ? CARDS[cycle % CARDS.length] : {}) });
+  const card = (name, k) => {
+    if (k < ACTIVE) return { ...message.commission.cards[name], state: "accepted" };
+    return { ...none, ...(k === ACTIVE ? CARDS[cycle % CARDS.length] : {}) };
+  };
   const end = ACTIVE < steps.length ? { state: "waiting" } : FINISH[cycle % FINISH.length];
   cycle++;
   return { ...told, commission: {
-    cards: Object.fromEntries(steps.map(({ name }, k) => [name, card(k)])),
+    cards: Object.fromEntries(steps.map(({ name }, k) => [name, card(name, k)])),
     known: { name: "my-motor", psi_f_mVs: 160.8, open: cycle % 3 > 0, source: cycle % 2 ? "" : "a data sheet with a long name" },
     finish: { refused: "", report: "", ...end } } };
 };

@@ -17,6 +17,7 @@ from progress import polled, until
 from selenium import webdriver
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
 
 WATCH, ARRIVALS = (Path(__file__).with_name(name).read_text() for name in ("still.js", "arrivals.js"))
 BATCHES = 90  # each extreme has come with each other one
@@ -121,6 +122,20 @@ def test_a_press_during_which_everything_arrives_has_its_effect_once(watched: No
         page.until(lambda before=before, count=count: batches(page) >= before + count, "batches")
         ActionChains(page.browser).release().perform()
         assert page.run("return window.saves") == press
+
+
+def test_a_repeated_capture_leaves_charts_cursors_and_zoom(page: Page) -> None:
+    capture_again_and_again(page)
+    page.find("scope-b").send_keys(Keys.ARROW_LEFT)
+    page.press("scope-zoom")
+    page.run("window.chart = document.querySelector('#scope-charts canvas')")
+    placed = "return [document.getElementById('scope-b').value, fluxtrue.ranges().slice(5)]"
+    before = page.run(placed)
+    for _ in range(2):
+        number = page.text("scope-told")
+        page.until(lambda number=number: page.text("scope-told") != number, "another capture")
+    assert page.run(placed) == before
+    assert page.run("return window.chart.isConnected")
 
 
 def test_a_recorded_drive_moves_no_control(watched: None, page: Page, replay: Callable[[Path], Server]) -> None:

@@ -224,6 +224,7 @@ def test_no_control_moves_while_a_step_reports_and_its_result_arrives(bench: Ben
     page.browser.get("about:blank")
     page.browser.get_log("browser")  # the pictures of results that were none
     page.browser.get(page.server.url)
+    page.until(lambda: page.find("offsets-do").is_enabled(), "the first step")
 
 
 def test_the_magnet_is_given_with_its_source_and_a_wrong_value_is_refused(bench: Bench) -> None:
