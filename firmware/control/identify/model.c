@@ -69,8 +69,7 @@ static void jacobian_rows(const identify_config_t *config, const identify_point_
 void identify_model(const identify_config_t *config, const identify_point_t *point, const identify_tables_t *tables,
                     q31_t r_prior, identify_model_t *model)
 {
-    model->psi_d = (jacobian_row_t){{0}}; /* the functions below write all else, but for the noise */
-    model->psi_q = (jacobian_row_t){{0}};
+    *model = (identify_model_t){.current = false};
     flux_derivatives(config, tables, point, model);
     jacobian_rows(config, point, r_prior, model);
 }
