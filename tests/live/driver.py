@@ -87,6 +87,11 @@ class Page:
         assert isinstance(newest_s, float)
         return newest_s
 
+    def hide_only(self, hidden: bool) -> None:
+        """Report the page as hidden or visible, on a page without charts."""
+        self.run("Object.defineProperty(document, 'hidden', {value: arguments[0], configurable: true});"
+                 "document.dispatchEvent(new Event('visibilitychange'));", hidden)  # fmt: skip
+
     def size(self, width: int, height: int, theme: str) -> None:
         """Another screen, in another theme of the system."""
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}

@@ -133,18 +133,19 @@ class Bench:
         polled(lambda: bool(self.page.run(script, theme)))
 
 
-@pytest.fixture(scope="module")
-def bench(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory,
-          browser: webdriver.Chrome) -> Iterator[Bench]:  # fmt: skip
-    place = tmp_path_factory.mktemp("wizard")
+@contextmanager
+def begun(pictures: Path, place: Path, browser: webdriver.Chrome, seed: int, *further: str) -> Iterator[Bench]:
+    """The wizard before a hidden machine; further: options of the command."""
     unknown = motors.load(str(NAMEPLATE))
-    truth, flux_map, plant = hidden.draw(NAME, SEED, unknown, nameplate_of(NAMEPLATE, unknown).i_max_A)
+    truth, flux_map, plant = hidden.draw(NAME, seed, unknown, nameplate_of(NAMEPLATE, unknown).i_max_A,
+                                         "--turning" not in further)  # fmt: skip
     machine = place / "machine.txt"
     machine.write_text(hidden.machine_text(plant, flux_map), encoding="utf-8")
     with VirtualEcu(unknown.folder.vecu, machine=machine) as ecu:
         options = (f"host={HOST}", f"port={ecu.can_port}", "tcp_tune=1")
         server = launch(place, "--motor", str(NAMEPLATE), "--commission", "--can-interface", "socketcand",
-                        *(f"--can-option={one}" for one in options), "--bench", f"{HOST}:{ecu.bench_port}")  # fmt: skip
+                        *(f"--can-option={one}" for one in options), "--bench", f"{HOST}:{ecu.bench_port}",
+                        *further)  # fmt: skip
         server.stand, server.ecu = Channel(HOST, ecu.bench_port), ecu
         page = Page(browser, server)
         browser.get("about:blank")
@@ -152,10 +153,18 @@ def bench(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
         page.size(1440, 900, "light")
         browser.get(server.url)
         page.until(lambda: page.text("state") == "standby", "standby")
-        yield Bench(page, truth, flux_map, Path(request.config.getoption("--pictures")))
+        yield Bench(page, truth, flux_map, pictures)
         browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
         end(server)
         server.stand.close()
+
+
+@pytest.fixture(scope="module")
+def bench(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory,
+          browser: webdriver.Chrome) -> Iterator[Bench]:  # fmt: skip
+    pictures, place = Path(request.config.getoption("--pictures")), tmp_path_factory.mktemp("wizard")
+    with begun(pictures, place, browser, SEED) as made:
+        yield made
 
 
 def test_without_an_interface_a_hidden_machine_is_started(tmp_path: Path) -> None:
@@ -288,13 +297,11 @@ def test_a_hidden_page_loses_the_step(bench: Bench) -> None:
     """After 300 ms, which test_wizard_rules.py checks to the microsecond; here simulated time goes on afterwards."""
     page = bench.page
     bench.begin("resistance")
-    page.run("Object.defineProperty(document, 'hidden', {value: true, configurable: true});"
-             "document.dispatchEvent(new Event('visibilitychange'));")  # fmt: skip
+    page.hide_only(True)
     page.until(lambda: bench.state("resistance") == "no result", "the end of the step")
     assert "closed or silent for 0.3 s" in page.text("resistance-refused")
     bench.is_off()
-    page.run("Object.defineProperty(document, 'hidden', {value: false, configurable: true});"
-             "document.dispatchEvent(new Event('visibilitychange'));")  # fmt: skip
+    page.hide_only(False)
 
 
 def test_closing_the_page_ends_the_step_although_no_page_is_there_for_which_time_waits(bench: Bench) -> None:
@@ -367,8 +374,7 @@ def test_the_map_is_found_and_the_folder_is_written(bench: Bench) -> None:
     assert not [entry for entry in page.browser.get_log("browser") if entry["level"] == "SEVERE"]
 
 
-@pytest.fixture(scope="module")
-def folder(bench: Bench, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def downloaded(bench: Bench, place: Path) -> Path:
     """The downloaded folder."""
     link = bench.page.find("finish-download").get_attribute("href")
     assert link is not None
@@ -377,9 +383,13 @@ def folder(bench: Bench, tmp_path_factory: pytest.TempPathFactory) -> Path:
         archive = zipfile.ZipFile(io.BytesIO(answer.read()))
     assert set(archive.namelist()) == {
         f"my-motor/{name}" for name in ("motor.toml", "flux_map.csv", "commission.txt", "commission.png")}  # fmt: skip
-    place = tmp_path_factory.mktemp("downloaded")
     archive.extractall(place)
     return place / "my-motor"
+
+
+@pytest.fixture(scope="module")
+def folder(bench: Bench, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return downloaded(bench, tmp_path_factory.mktemp("downloaded"))
 
 
 def test_the_downloaded_folder_names_its_sources(folder: Path, bench: Bench) -> None:

@@ -64,8 +64,18 @@ class Bench:
 
 @pytest.fixture
 def bench(tmp_path: Path) -> Bench:
+    return made_of(tmp_path, "map")
+
+
+@pytest.fixture
+def turning(tmp_path: Path) -> Bench:
+    """With the steps that turn the shaft."""
+    return made_of(tmp_path, "all")
+
+
+def made_of(tmp_path: Path, steps: str) -> Bench:
     interface = read_interface()
-    wizard, bus = Wizard(chosen(("map",)), tmp_path, KNOWN, 375.0, 12.0), Bus()
+    wizard, bus = Wizard(chosen((steps,)), tmp_path, KNOWN, 375.0, 12.0), Bus()
     samples, recorder = Samples(interface.database), Recorder(tmp_path, interface)
     session = Session("", 100.0, samples, recorder, {}, link=bus, wizard=wizard)  # type: ignore[arg-type]
     made = Bench(wizard, session, bus)
@@ -94,6 +104,30 @@ def test_only_the_next_step_begins_and_its_result_counts_when_it_is_accepted(ben
     assert bench.states() == ["accepted", "next", "waiting"]
     bench.ask("commission_do", step="resistance")
     assert bench.begun == [("offsets", (), Found(), KNOWN), ("resistance", ("offsets",), found, KNOWN)]
+
+
+def test_a_step_that_turns_the_shaft_needs_a_consent_to_each_movement(turning: Bench) -> None:
+    offered = {step["name"]: step["turns"] for step in turning.wizard.offer()}
+    assert offered == {"offsets": False, "phases": True, "spin": True, "drag": True, "resistance": False, "map": False}
+    turning.ask("commission_do", step="offsets")
+    turning.wizard.found("offsets", Found())
+    turning.ask("commission_accept", step="offsets")
+    for may_turn in ({}, {"may_turn": False}, {"may_turn": 1}, {"may_turn": "true"}):
+        with pytest.raises(FluxtrueError, match="step phases: it turns the shaft, allowed: with the consent"):
+            turning.ask("commission_do", step="phases", **may_turn)
+    assert turning.states()[1] == "next" and len(turning.begun) == 1
+    turning.ask("commission_do", step="phases", may_turn=True)
+    turning.wizard.refused("phases", "Stop was pressed.")
+    with pytest.raises(FluxtrueError, match="it turns the shaft"):
+        turning.ask("commission_do", step="phases")
+    assert turning.begun[1:] == [("phases", ("offsets",), Found(), KNOWN)]
+
+
+def test_a_magnet_that_a_step_measures_is_not_given(turning: Bench) -> None:
+    turning.ask("commission_know", **GOOD | {"name": "truck"})
+    assert turning.wizard.shown()["known"] == {"name": "truck", "psi_f_mVs": 160.0, "source": "", "open": True}
+    with pytest.raises(FluxtrueError, match="letters, digits"):
+        turning.ask("commission_know", name="../up")
 
 
 def test_a_repeated_result_is_discarded_and_a_refused_step_can_be_done_again(bench: Bench) -> None:

@@ -132,10 +132,21 @@ def _levels(axes: Axes, found: Found, _: Nameplate) -> None:
     axes.legend(fontsize=8)
 
 
+def _drag(axes: Axes, found: Found, _: Nameplate) -> None:
+    assert found.drag is not None
+    speed = np.linspace(found.drag.from_rad_s, found.drag.to_rad_s, 100)
+    axes.plot(30.0 / np.pi * speed, found.drag.torque_Nm(speed), lw=1.5)
+    axes.set(title="Drag: torque against the rotation", xlabel="speed, rpm", ylabel="N·m")
+    axes.set_ylim(bottom=0.0)
+
+
 Panel = Callable[[Axes, Found, Nameplate], None]
 # Of each step, in the order of live/wizard/files.py, which has their titles.
 PANELS: Final[dict[str, tuple[Panel, ...]]] = {
     "offsets": (_offset,),
+    "phases": (),
+    "spin": (),
+    "drag": (_drag,),
     "resistance": (_levels,),
     "map": (_places, lambda axes, found, _: _left(axes, found), partial(_curves, of_d=True),
             partial(_curves, of_d=False)),

@@ -71,6 +71,7 @@ class Step:
     does: str
     run: Callable[[Capture, Found, Nameplate], None]
     seconds: float  # about as long does the drive run, in software in the loop
+    bus_seconds: float = 0.0  # the same over CAN; 0: as many times longer as the drive says
 
 
 Earlier = tuple[tuple[str, ...], Found]  # finished steps, and what they have found
@@ -166,11 +167,11 @@ def _map(drive: Capture, found: Found, known: Nameplate) -> None:
 STEPS = (
     Step("offsets", "switching is disabled, nothing moves, no current", _offsets, 0.15),
     Step(connection.NAME, "a current of up to {vector:.3g} A that does not turn with the rotor: the shaft turns "
-         "slowly, by up to {turns:g} turns divided by the pole pairs, and back", _phases, 10.0),
+         "slowly, by up to {turns:g} turns divided by the pole pairs, and back", _phases, 10.0, 20.0),
     Step(spin.NAME, "the shaft turns at up to {speed:.0f} rpm in both directions, with up to {torque:.3g} A of current "
-         "that makes torque", _spin, 30.0),
+         "that makes torque", _spin, 30.0, 150.0),
     Step(drag.NAME, "the shaft is accelerated to {speed:.0f} rpm, runs down and is braked, with up to {torque:.3g} A",
-         _drag, 10.0),
+         _drag, 10.0, 25.0),
     Step("resistance", "direct currents up to {level:.3g} A along the magnet for {level_s:.1f} s; no torque",
          _resistance, 4.0),
     Step("map", "voltage pulses with currents up to {reach:.3g} A; alternating torque: the rotor swings; beyond "
@@ -180,6 +181,7 @@ NEEDS = {"offsets": ("offsets",), "phases": ("offsets", "phases"), "spin": ("off
          "drag": ("offsets", "phases", "spin", "drag"), "resistance": ("offsets", "resistance"),
          "map": ("offsets", "resistance", "map")}  # fmt: skip
 ALL = "all"
+TURNING = (connection.NAME, spin.NAME, drag.NAME)  # the steps that turn the shaft
 
 
 def chosen(names: tuple[str, ...]) -> list[Step]:

@@ -119,19 +119,20 @@ def _refuse_without_effect(commission: bool, can_interface: str | None, replay: 
     if replay is not None and can_interface is not None:
         raise FluxtrueError("--replay and --can-interface exclude each other")
     if replay is not None:
-        paths.refuse_given("with --replay", "elf", "record_dir", "commission", "machine", "seed")
+        paths.refuse_given("with --replay", "elf", "record_dir", "commission", "turning", "machine", "seed")
     if can_interface is None:
         paths.refuse_given("without --can-interface", "elf", "can_channel", "can_option", "bench")
     if not commission:
-        paths.refuse_given("without --commission", "machine", "seed")
+        paths.refuse_given("without --commission", "turning", "machine", "seed")
         return
     paths.refuse_given("with --commission", "in_step", "record_dir")
     if can_interface is not None:
         paths.refuse_given("with --can-interface", "machine", "seed")
 
 
-def _commission(motor: str, machine: str, seed: int, address: BusAddress | None, bench: tuple[str, int] | None,
-                elf: Path | None, port: int, record_dir: Path, build_dir: Path | None) -> None:  # fmt: skip
+def _commission(motor: str, machine: str, seed: int, turning: bool, address: BusAddress | None,
+                bench: tuple[str, int] | None, elf: Path | None, port: int, record_dir: Path,
+                build_dir: Path | None) -> None:  # fmt: skip
     """The wizard for an unknown motor."""
     from fluxtrue_tools.commission.hidden import folder_of  # scipy: only when it is needed
     from fluxtrue_tools.live.wizard import start
@@ -142,7 +143,8 @@ def _commission(motor: str, machine: str, seed: int, address: BusAddress | None,
     folder_of(machine)
     nameplate = locate(motor, Path.cwd(), "--motor")[1]
     built = motors.load(motor, build_dir, where="--motor")
-    with start.session(nameplate, built, start.Terminals(machine, seed, address, bench, elf), record_dir) as session:
+    terminals = start.Terminals(machine, seed, address, bench, elf, turning)
+    with start.session(nameplate, built, terminals, record_dir) as session:
         _serve(session, port)
 
 
@@ -160,6 +162,8 @@ def _commission(motor: str, machine: str, seed: int, address: BusAddress | None,
               help="The bench's firmware image: its calibration values can then be tuned.")  # fmt: skip
 @click.option("--commission", is_flag=True,
               help="Measure an unknown motor, step by step; --motor is the folder of its nameplate.")  # fmt: skip
+@click.option("--turning", is_flag=True,
+              help="With --commission: also the steps that turn the shaft (connection, magnet, drag).")  # fmt: skip
 @click.option("--machine", default="hsm1", show_default=True, metavar="NAME",
               help="With --commission: the simulated machine, one of the project's, changed at random.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of these changes.")
@@ -170,13 +174,13 @@ def _commission(motor: str, machine: str, seed: int, address: BusAddress | None,
 @click.option("--build-dir", type=paths.InputFolder(),
               help="Take the virtual ECU from this build folder as it is.")  # fmt: skip
 def live(motor: str, can_interface: str | None, can_channel: str, can_option: tuple[tuple[str, Any], ...],
-         bench: tuple[str, int] | None, in_step: bool, elf: Path | None, commission: bool, machine: str, seed: int,
-         replay: Path | None, port: int, record_dir: Path, build_dir: Path | None) -> None:  # fmt: skip
+         bench: tuple[str, int] | None, in_step: bool, elf: Path | None, commission: bool, turning: bool, machine: str,
+         seed: int, replay: Path | None, port: int, record_dir: Path, build_dir: Path | None) -> None:  # fmt: skip
     """Serve a page that draws the drive live, commands torque, tunes and records. Loopback only."""
     _refuse_without_effect(commission, can_interface, replay)
     if commission:
         address = None if can_interface is None else BusAddress(can_interface, can_channel, dict(can_option))
-        _commission(motor, machine, seed, address, bench, elf, port, record_dir, build_dir)
+        _commission(motor, machine, seed, turning, address, bench, elf, port, record_dir, build_dir)
         return
     # Files that are given are read before anything is built or started.
     recording = None if replay is None else load(replay)

@@ -242,9 +242,11 @@ def _commission(session: Session, socket: web.WebSocketResponse, wizard: "Wizard
         raise FluxtrueError(NO_COMMANDS)
     take(session, socket)
     if kind == "commission_do":
-        wizard.do(step)
+        wizard.do(step, message.get("may_turn") is True)
     elif kind == "commission_accept":
         wizard.accept(step)
+    elif wizard.measures_magnet:
+        wizard.call(str(message.get("name")))
     else:
         psi_f_mVs = number(message.get("psi_f_mVs"), "psi_f")
         wizard.know(str(message.get("name")), psi_f_mVs, str(message.get("source")))

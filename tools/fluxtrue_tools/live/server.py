@@ -13,7 +13,7 @@ import json
 from collections.abc import Awaitable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
@@ -25,6 +25,9 @@ from fluxtrue_tools.live.pace import InStep
 from fluxtrue_tools.live.session import SESSION, Session
 from fluxtrue_tools.live.stand import KNOBS
 from fluxtrue_tools.live.wizard.files import PICTURES, folder_file, picture
+
+if TYPE_CHECKING:
+    from fluxtrue_tools.live.wizard.wizard import Wizard
 
 HOST: Final = "127.0.0.1"
 BATCH_S: Final = 0.04  # 25 per second
@@ -62,6 +65,11 @@ async def _page(request: web.Request) -> web.FileResponse:
     return web.FileResponse(PAGE / "index.html")
 
 
+def _offer(wizard: "Wizard") -> dict[str, Any]:
+    return {"steps": wizard.offer(), "pictures": PICTURES, "measures_magnet": wizard.measures_magnet,
+            "most_rpm": wizard.most_rpm}  # fmt: skip
+
+
 def _hello(session: Session) -> dict[str, Any]:
     knobs = session.link.status().knobs if session.link is not None else ()
     stand = {name: [KNOBS[name].lo, KNOBS[name].hi] for name, _ in knobs}
@@ -69,7 +77,7 @@ def _hello(session: Session) -> dict[str, Any]:
     return {"type": "hello", "title": session.title, "torque_max_Nm": session.torque_max_Nm, "scope": offer,
             "factors": session.samples.factors(), "replay": session.link is None,
             "tuning": session.tuning is not None, "stand": stand, "words": session.words,
-            "commission": {"steps": session.wizard.offer(), "pictures": PICTURES} if session.wizard else None,
+            "commission": _offer(session.wizard) if session.wizard else None,
             "stale_s": session.wall_s(STALE_S)}  # fmt: skip
 
 

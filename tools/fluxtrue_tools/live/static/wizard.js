@@ -12,6 +12,8 @@ const COLUMNS = ["Quantity", "Found", "±", "Bound"];
 const NOW = "next";
 let cards = {};
 let pictures = {};
+let isMagnetMeasured = false; // by a step
+const mayBegin = {}; // by step: it can be done now, with the consent to a movement if it turns the shaft
 
 function button(id, text, kind, act) {
   const made = Object.assign(element("button", text, kind), { id, type: "button", hidden: true, disabled: true });
@@ -19,9 +21,25 @@ function button(id, text, kind, act) {
   return made;
 }
 
-function ask(type, step) {
+function ask(type, step, more = {}) {
   say("");
-  send({ type, step });
+  send({ type, step, ...more });
+}
+
+// The consent to a movement is given for one time.
+function begin(name) {
+  const box = $(`${name}-free`);
+  ask("commission_do", name, { may_turn: Boolean(box?.checked) });
+  if (box) box.checked = false;
+}
+
+function consent(name, limit) {
+  const made = Object.assign(element("div", "", "consent"), { id: `${name}-consent` }), label = element("label", "", "check");
+  label.append(Object.assign(element("input"), { type: "checkbox", id: `${name}-free`, disabled: true, onchange: () => showBegin(name) }),
+    "The shaft is free, and nothing can be caught by it: it may turn as said above.");
+  made.append(element("p", "To stop: press Stop or Escape, or hide or close this page. Switching is then disabled, and the shaft "
+    + `runs down by itself. Beyond ${Math.round(limit)} rpm the inverter disables switching.`), label);
+  return made;
 }
 
 function heading(id, text) {
@@ -38,7 +56,7 @@ function results(name) {
   return table;
 }
 
-function makeCard({ name, title, does, seconds }, k) {
+function makeCard({ name, title, does, seconds, turns }, k, limit) {
   const card = Object.assign(element("li", "", "card step"), { id: `step-${name}` });
   card.setAttribute("aria-labelledby", `${name}-title`);
   const bar = Object.assign(element("progress"), { id: `${name}-bar`, max: seconds });
@@ -49,12 +67,12 @@ function makeCard({ name, title, does, seconds }, k) {
   refused.setAttribute("role", "alert");
   // The buttons and the progress have one place, above everything that grows.
   const actions = element("div", "", "bar"), stage = Object.assign(element("div", "", "stage"), { id: `${name}-stage` });
-  actions.append(button(`${name}-do`, "Do this step", "primary", () => ask("commission_do", name)),
+  actions.append(button(`${name}-do`, "Do this step", "primary", () => begin(name)),
     button(`${name}-accept`, "Accept", "primary", () => ask("commission_accept", name)));
   stage.append(actions, progress);
   card.append(heading(name, `${k + 1} ${title}`), element("p", `${does[0].toUpperCase()}${does.slice(1)}.`, "does"),
     element("p", `About ${Math.ceil(seconds)} s on the bus. Nothing is changed before the result is accepted.`, "quiet"),
-    stage, refused, results(name), Object.assign(element("div", "", "pictures"), { id: `${name}-pictures` }));
+    ...(turns ? [consent(name, limit)] : []), stage, refused, results(name), Object.assign(element("div", "", "pictures"), { id: `${name}-pictures` }));
   return card;
 }
 
@@ -65,8 +83,10 @@ export function offerWizard(hello) {
   $("wizard").hidden = !on;
   if (!on) return;
   ({ pictures } = hello.commission);
+  isMagnetMeasured = hello.commission.measures_magnet;
+  document.body.classList.toggle("turning", isMagnetMeasured);
   show("drive-title", "Inverter");
-  cards = Object.fromEntries(hello.commission.steps.map((step, k) => [step.name, makeCard(step, k)]));
+  cards = Object.fromEntries(hello.commission.steps.map((step, k) => [step.name, makeCard(step, k, hello.commission.most_rpm)]));
   $("wizard-steps").replaceChildren(...Object.values(cards));
 }
 
@@ -74,7 +94,8 @@ function use(event) {
   event.preventDefault();
   say("");
   const psi_f_mVs = entered($("known-psi"));
-  if (psi_f_mVs === null) say("Nothing was changed: the field of the magnet holds no number.");
+  if (isMagnetMeasured) send({ type: "commission_know", name: $("known-name").value });
+  else if (psi_f_mVs === null) say("Nothing was changed: the field of the magnet holds no number.");
   else send({ type: "commission_know", name: $("known-name").value, psi_f_mVs, source: $("known-source").value });
 }
 
@@ -129,18 +150,25 @@ function showPictures(name, number) {
   }));
 }
 
+function showBegin(name) {
+  const box = $(`${name}-free`);
+  if (box) box.disabled = !mayBegin[name];
+  $(`${name}-do`).disabled = !mayBegin[name] || box?.checked === false;
+}
+
 function showCard(name, card, mayAct, isFree) {
   const { state, rows, refused, step_s } = card, can = { do: ["next", "refused", "found"].includes(state), accept: state === "found" };
   setBadge(name, state);
   cards[name].ariaCurrent = state === "waiting" || state === "accepted" ? null : "step";
-  for (const [what, shown] of Object.entries(can)) {
-    $(`${name}-${what}`).hidden = !shown;
-    $(`${name}-${what}`).disabled = !(shown && mayAct && isFree);
-  }
+  for (const [what, shown] of Object.entries(can)) $(`${name}-${what}`).hidden = !shown;
+  $(`${name}-accept`).disabled = !(can.accept && mayAct && isFree);
+  mayBegin[name] = can.do && mayAct && isFree;
+  showBegin(name);
   show(`${name}-do`, state === NOW ? "Do this step" : "Repeat");
   $(`${name}-do`).classList.toggle("primary", state === NOW);
   $(`${name}-progress`).hidden = state !== "running";
   $(`${name}-stage`).hidden = state === "waiting" || state === "accepted";
+  if ($(`${name}-consent`)) $(`${name}-consent`).hidden = $(`${name}-stage`).hidden;
   const { max } = $(`${name}-bar`), late = step_s > max;
   $(`${name}-bar`).value = Math.min(step_s, max);
   show(`${name}-time`, late ? `${step_s.toFixed(0)} s: takes longer than usual.` : `${step_s.toFixed(0)} s of about ${Math.ceil(max)} s on the bus. `
@@ -153,7 +181,8 @@ function showCard(name, card, mayAct, isFree) {
 function showKnown({ name, psi_f_mVs, source, open }, mayAct) {
   for (const id of ["known-name", "known-psi", "known-source", "known-use"]) $(id).disabled = !(mayAct && open);
   const psi = `${Number(psi_f_mVs.toPrecision(4))} mV·s`;
-  show("known-text", source ? `Used for ${name}: magnet ${psi} (${source}).`
+  if (isMagnetMeasured) return show("known-text", `The folder's name will be ${name}. The magnet is measured.`);
+  return show("known-text", source ? `Used for ${name}: magnet ${psi} (${source}).`
     : `Without an entry the guess of the nameplate is used, ${psi}: the torque is then as uncertain as this guess.`);
 }
 

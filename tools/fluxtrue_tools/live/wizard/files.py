@@ -16,6 +16,9 @@ FINISH: Final = "finish"
 # What the pictures of each card show, for commission/plot.py.
 PICTURES: Final = {
     "offsets": ("Currents that the sensors show without current",),
+    "phases": (),
+    "spin": (),
+    "drag": ("Torque against the rotation over the speed",),
     "resistance": ("Mean voltages over mean currents, with the slope of the resistance",),
     "map": ("Currents of all bursts in the circle of the largest current", "What the surface leaves of the samples",
             "Flux linkage of the d axis: samples on the surface", "Flux linkage of the q axis: samples on the surface"),

@@ -6,13 +6,16 @@ from typing import Final
 
 import numpy as np
 
-from fluxtrue_tools.commission import plan
+from fluxtrue_tools.commission import connection, plan
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.steps import Found
 
-TITLES: Final = {"offsets": "Current sensors at rest", "resistance": "Resistance and inverter", "map": "Flux map"}
+TITLES: Final = {"offsets": "Current sensors at rest", "phases": "Leads, angle sensor and pole pairs",
+                 "spin": "Angle offset and magnet", "drag": "Inertia and drag",
+                 "resistance": "Resistance and inverter", "map": "Flux map"}  # fmt: skip
 # What tests/commission requires of hidden machines.
 OFFSET_SHARE, R_SHARE, MAP_SHARE, GAIN_SHARE = 0.001, 0.01, 0.01, 0.002
+ANGLE_DEG, PSI_SHARE, INERTIA_SHARE, DRAG_SHARE = 0.2, 0.005, 0.03, 0.1
 
 Row = tuple[str, str, str, str]  # what, found, ±, bound
 
@@ -21,6 +24,53 @@ def _offsets(found: Found, _: Nameplate, full_scale_A: float) -> list[Row]:
     sigma, bound = f"{found.offset_sigma_A:.2g} A", f"± at most {OFFSET_SHARE * full_scale_A:.2g} A"
     return [(f"Offset along {axis}", f"{value:+.3f} A", sigma, bound)
             for axis, value in (("alpha", found.offset_A.real), ("beta", found.offset_A.imag))]  # fmt: skip
+
+
+def _way(is_reversed: bool) -> str:
+    return "against the field" if is_reversed else "with the field"
+
+
+def _phases(found: Found, known: Nameplate, _: float) -> list[Row]:
+    assert found.followed is not None
+    followed = found.followed
+    wired, behind_deg = followed.connection, math.degrees(followed.behind_rad)
+    return [
+        ("Pole pairs", f"{wired.pole_pairs}", "", f"measured {abs(followed.pole_pairs):.3f}, at most "
+         f"{connection.WHOLE} from a whole number"),
+        ("Pole pairs of the nameplate", f"{known.pole_pairs}", "", ""),
+        ("The angle sensor counts", _way(wired.reversed), "", ""),
+        ("Electrical angle at its zero", f"{math.degrees(wired.offset_rad):.1f}°", "", "the next step refines it"),
+        ("The rotor followed a current of", f"{followed.current_A:.3g} A", "", ""),
+        ("Rotor behind the current, rms, electrical", f"{behind_deg:.1f}°", "",
+         f"at most {math.degrees(connection.BEHIND_RAD):.0f}°"),
+    ]  # fmt: skip
+
+
+def _spin(found: Found, known: Nameplate, _: float) -> list[Row]:
+    assert found.spun is not None
+    spun = found.spun
+    rpm = 30.0 / math.pi * spun.omega_rad_s / spun.connection.pole_pairs
+    return [
+        ("Magnet ψ_f, beyond the gain of the dc voltage", f"{1e3 * spun.psi_f_Vs:.4g} mV·s",
+         f"{1e3 * spun.psi_f_sigma_Vs:.1g} mV·s", f"± at most {1e3 * PSI_SHARE * spun.psi_f_Vs:.2g} mV·s"),
+        ("Magnet ψ_f before this step", f"{1e3 * known.psi_f_Vs:.4g} mV·s", "", ""),
+        ("Electrical angle at the sensor's zero", f"{math.degrees(spun.connection.offset_rad):.2f}°",
+         f"{math.degrees(spun.offset_sigma_rad):.1g}°", f"± at most {ANGLE_DEG:g}°"),
+        ("The angle is late by", f"{1e6 * spun.lag_s:.1f} µs", "", ""),
+        ("Speed of the measurement", f"{rpm:.0f} rpm", "", "both directions"),
+    ]  # fmt: skip
+
+
+def _drag(found: Found, _: Nameplate, __: float) -> list[Row]:
+    assert found.drag is not None
+    drag = found.drag
+    rows = [("Inertia", f"{drag.inertia_kgm2:.4g} kg·m²", f"{drag.inertia_sigma_kgm2:.1g} kg·m²",
+             f"± at most {INERTIA_SHARE * drag.inertia_kgm2:.2g} kg·m²")]  # fmt: skip
+    for speed in (0.4 * drag.to_rad_s, drag.to_rad_s):
+        torque_Nm = float(drag.torque_Nm(np.array(speed)))
+        rows.append((f"Drag at {30.0 / math.pi * speed:.0f} rpm", f"{torque_Nm:.3g} N·m", "",
+                     f"± at most {DRAG_SHARE * torque_Nm:.1g} N·m"))  # fmt: skip
+    return rows
 
 
 def _resistance(found: Found, known: Nameplate, _: float) -> list[Row]:
@@ -71,4 +121,5 @@ def _map(found: Found, known: Nameplate, _: float) -> list[Row]:
 
 def rows(step: str, found: Found, known: Nameplate, full_scale_A: float) -> list[Row]:
     """Of one step."""
-    return {"offsets": _offsets, "resistance": _resistance, "map": _map}[step](found, known, full_scale_A)
+    return {"offsets": _offsets, "phases": _phases, "spin": _spin, "drag": _drag, "resistance": _resistance,
+            "map": _map}[step](found, known, full_scale_A)  # fmt: skip

@@ -23,7 +23,7 @@ from fluxtrue_tools.live.words import words
 from fluxtrue_tools.sim.motor import Motor
 from fluxtrue_tools.vecu.channel import Channel
 
-LAST_STEP = "map"  # with those that it needs: no step over CAN turns the shaft
+STANDING, WITH_TURNING = ("map",), ("all",)  # with the steps that they need
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,7 @@ class Terminals:
     address: BusAddress | None = None
     bench: tuple[str, int] | None = None
     elf: Path | None = None
+    turning: bool = False  # with the steps that turn the shaft: leads and angle sensor are not known
 
 
 def _waits(bench: on_the_bus.Bench) -> bool:
@@ -55,10 +56,13 @@ def session(nameplate: Path, motor: Motor, at: Terminals, records: Path) -> Iter
                 at.address, at.elf or motor.folder.vecu, at.bench)  # fmt: skip
         else:
             title = "unknown motor, simulated"
-            bench = stack.enter_context(on_the_bus.hidden_machine(motor, at.machine, at.seed, known.i_max_A))
+            bench = stack.enter_context(
+                on_the_bus.hidden_machine(motor, at.machine, at.seed, known.i_max_A, not at.turning)
+            )
         interface = read_interface(motor.folder.dbc)
         samples, recorder = Samples(interface.database), Recorder(records, interface)
-        wizard = Wizard(chosen((LAST_STEP,)), nameplate, known, motor.plant["current_full_scale_A"], OverTheBus.slower)
+        wizard = Wizard(chosen(WITH_TURNING if at.turning else STANDING), nameplate, known,
+                        motor.plant["current_full_scale_A"], OverTheBus.slower)  # fmt: skip
         stack.callback(wizard.close)
         in_step = InStep() if _waits(bench) else None
         setup = Setup(bench, motor.folder, known, in_step is not None)

@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from fluxtrue_tools.commission.nameplate import Nameplate
-from fluxtrue_tools.commission.steps import Found, Step, announcement
+from fluxtrue_tools.commission.steps import TURNING, Found, Step, announcement
+from fluxtrue_tools.commission.turning import LIMIT_SHARE
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live.wizard.folder import Folder, written
 from fluxtrue_tools.live.wizard.results import TITLES, Row, rows
@@ -23,6 +24,7 @@ from fluxtrue_tools.motor.map_import.folder import name_from
 NAME: Final = "my-motor"
 SOURCE_MAX: Final = 60
 MAGNET_BEFORE: Final = "resistance"  # its evaluation needs the flux linkage of the magnet
+MAGNET_BY: Final = "spin"  # measures it
 
 
 @dataclass
@@ -65,11 +67,21 @@ class Wizard:
     def offer(self) -> list[dict[str, Any]]:
         """What each step does: the same words as of commission --dry-run, and how long the drive runs."""
         return [{"name": step.name, "title": TITLES[step.name], "does": announcement(step, self._known),
-                 "seconds": self._seconds(step)}
+                 "seconds": self._seconds(step), "turns": step.name in TURNING}
                 for step in (card.step for card in self._cards.values())]  # fmt: skip
 
+    @property
+    def most_rpm(self) -> float:
+        """The speed at which the firmware ends a movement."""
+        return LIMIT_SHARE * self._known.speed_max_rpm
+
+    @property
+    def measures_magnet(self) -> bool:
+        """Whether a step measures its flux linkage; otherwise the user can give it."""
+        return MAGNET_BY in self._cards
+
     def _seconds(self, step: Step) -> float:
-        return step.seconds * self._slower
+        return step.bus_seconds or step.seconds * self._slower
 
     def shown(self) -> dict[str, Any]:
         """The present state."""
@@ -105,17 +117,26 @@ class Wizard:
     # What a page with control may do.
 
     def _is_open(self) -> bool:
-        """Whether the magnet's flux linkage can still be given."""
+        """Whether the name, and the magnet's flux linkage if no step measures it, can still be given."""
         return self._cards[MAGNET_BEFORE].state in ("waiting", "next", "refused")
 
-    def know(self, name: str, psi_f_mVs: float, source: str) -> None:
-        """The user's name for the motor, and the flux linkage of its magnet with its source."""
+    def _check_name(self, name: str) -> None:
+        if not self._is_open():
+            raise FluxtrueError("name and psi_f: the resistance has been measured with the present values, allowed: "
+                                "before that step")  # fmt: skip
+        if name != name_from(Path("/") / name) or not name:
+            raise FluxtrueError(f"name {name!r}: allowed: letters, digits, blank and _.+-, at most 48")
+
+    def call(self, name: str) -> None:
+        """The user's name for the motor."""
         with self._lock:
-            if not self._is_open():
-                raise FluxtrueError("psi_f: the resistance has been measured with the present value, allowed: before "
-                                    "that step")  # fmt: skip
-            if name != name_from(Path("/") / name) or not name:
-                raise FluxtrueError(f"name {name!r}: allowed: letters, digits, blank and _.+-, at most 48")
+            self._check_name(name)
+            self._name = name
+
+    def know(self, name: str, psi_f_mVs: float, source: str) -> None:
+        """The name, and the flux linkage of the magnet with its source."""
+        with self._lock:
+            self._check_name(name)
             if not (math.isfinite(psi_f_mVs) and psi_f_mVs > 0.0):
                 raise FluxtrueError(f"psi_f {psi_f_mVs:g} mV·s: allowed: more than 0")
             if not source.isprintable() or len(source) > SOURCE_MAX or not source.strip():
@@ -131,10 +152,15 @@ class Wizard:
             raise FluxtrueError(f"step {name}: not now, it is {card.state}")
         return card
 
-    def do(self, name: str) -> None:
-        """The user consents to a step, or repeats it: a result that was not accepted is discarded."""
+    def do(self, name: str, may_turn: bool) -> None:
+        """The user consents to a step, or repeats it: a result that was not accepted is discarded.
+
+        may_turn   the user has also agreed that the shaft turns, for this time
+        """
         with self._lock:
             card = self._card(name, "next", "refused", "found")
+            if name in TURNING and not may_turn:
+                raise FluxtrueError(f"step {name}: it turns the shaft, allowed: with the consent to that")
             done = tuple(name for name, card in self._cards.items() if card.state == "accepted")
             accepted = self._cards[done[-1]].found if done else None
             card.state, card.found, card.rows, card.refused = "running", None, [], ""
