@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/acquire.h"
 
+#include "fx/codegen.h"
 #include "hal/adc.h"
 #include "hal/angle.h"
 
@@ -22,8 +23,7 @@ static void replace_angle(drive_t *drive, sample_t *sample)
 }
 
 /* A sample that has jumped or repeats the last reading. */
-static __attribute__((noinline)) void check_angle(drive_t *drive, sample_t *sample, int32_t step, bool jumped,
-                                                  bool repeated)
+static FX_NOT_INLINED void check_angle(drive_t *drive, sample_t *sample, int32_t step, bool jumped, bool repeated)
 {
     angle_tracker_state_t *tracker = &drive->fast.angle_tracker;
     angle_t angle = {sample->theta_e, step, sample->point.omega, jumped};
@@ -61,7 +61,7 @@ acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
     sample->theta_e = angle.theta_e;
     /* In the usual route a repeated reading is noticed at the end of the period (publish_sample()). */
     const bool repeated = !settled && theta_m == tracker->theta_m;
-    if (__builtin_expect(angle.jumped | repeated, 0)) {
+    if (angle.jumped | repeated) {
         check_angle(drive, sample, angle.step, angle.jumped, repeated);
         return (acquired_t){angle.step, false};
     }

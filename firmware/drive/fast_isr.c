@@ -17,6 +17,7 @@
 #include "drive/publish.h"
 #include "drive/short_circuit.h"
 #include "drive/turning_modulate.h"
+#include "fx/codegen.h"
 #include "hal/pwm.h"
 
 #define PERIODS_TO_ACT 3 /* from enabling until the voltage of the whole last period is known */
@@ -55,9 +56,8 @@ static void apply_safe_state(drive_t *drive, sample_t *sample, const command_t *
 }
 
 /* The voltage circle or a pulse limit is active: the voltage of the next period follows from the duties. */
-static inline __attribute__((always_inline)) void voltage_by(drive_t *drive, sample_t *sample,
-                                                             const modulate_config_t *config, modulate_out_t made,
-                                                             fx_pair_t i, fx_pair_t advanced)
+static inline FX_INLINED void voltage_by(drive_t *drive, sample_t *sample, const modulate_config_t *config,
+                                         modulate_out_t made, fx_pair_t i, fx_pair_t advanced)
 {
     if (made.limited != 0U) {
         sample->pulses_clamped = true;
@@ -66,8 +66,8 @@ static inline __attribute__((always_inline)) void voltage_by(drive_t *drive, sam
     drive->fast.u_next = modulate_applied(config, &made.duty, i, advanced, sample->v_dc);
 }
 
-static __attribute__((noinline, flatten)) void voltage_from_duties(drive_t *drive, sample_t *sample,
-                                                                   modulate_out_t made, fx_pair_t i, fx_pair_t advanced)
+static FX_NOT_INLINED FX_INLINES_CALLS void voltage_from_duties(drive_t *drive, sample_t *sample, modulate_out_t made,
+                                                                fx_pair_t i, fx_pair_t advanced)
 {
     voltage_by(drive, sample, &drive->parameters.modulate, made, i, advanced);
 }
@@ -91,9 +91,9 @@ static current_control_in_t control_inputs(const drive_t *drive, const sample_t 
 }
 
 /* Current control of a motor whose field turns far in a period. */
-static __attribute__((noinline, cold)) current_control_out_t control_turning(drive_t *drive, const sample_t *sample,
-                                                                             const rotor_frame_t *now,
-                                                                             const current_target_t *target)
+static FX_NOT_INLINED FX_COLD current_control_out_t control_turning(drive_t *drive, const sample_t *sample,
+                                                                    const rotor_frame_t *now,
+                                                                    const current_target_t *target)
 {
     turning_control_in_t in = {control_inputs(drive, sample, now, target), sample->point.i, now->angle_step};
     in.control.omega = now->omega >> 31;
@@ -102,9 +102,8 @@ static __attribute__((noinline, cold)) current_control_out_t control_turning(dri
 }
 
 /* Modulation -> duties. The voltage that acts now was computed a period ago. turning: NULL on the usual route. */
-static inline __attribute__((always_inline)) void write_duties(drive_t *drive, sample_t *sample,
-                                                               const rotor_frame_t *now, current_control_out_t wanted,
-                                                               const modulate_config_t *turning)
+static inline FX_INLINED void write_duties(drive_t *drive, sample_t *sample, const rotor_frame_t *now,
+                                           current_control_out_t wanted, const modulate_config_t *turning)
 {
     fast_state_t *fast = &drive->fast;
     const motor_parameters_t *p = &drive->parameters;
@@ -118,7 +117,7 @@ static inline __attribute__((always_inline)) void write_duties(drive_t *drive, s
     fast->u_next.q = wanted.u.q;
     const modulate_config_t *modulate = (turning != NULL) ? turning : &p->modulate;
     duty_t duty;
-    if (__builtin_expect(wanted.clear, 1)) {
+    if (wanted.clear) {
         duty = modulate_clear(modulate, wanted.v, now->i_dq, now->advanced);
     } else {
         const modulate_out_t made = modulate_step(modulate, wanted.v, now->i_dq, now->advanced);
@@ -135,8 +134,8 @@ static inline __attribute__((always_inline)) void write_duties(drive_t *drive, s
     hal_pwm_write(duty);
 }
 
-static __attribute__((noinline, cold)) void
-write_duties_turning(drive_t *drive, sample_t *sample, const rotor_frame_t *now, const current_control_out_t *wanted)
+static FX_NOT_INLINED FX_COLD void write_duties_turning(drive_t *drive, sample_t *sample, const rotor_frame_t *now,
+                                                        const current_control_out_t *wanted)
 {
     const modulate_config_t modulate = turning_modulate(&drive->parameters.modulate,
                                                         drive->motor->turning_control.knee_turns_q27, now->angle_step);
@@ -144,8 +143,8 @@ write_duties_turning(drive_t *drive, sample_t *sample, const rotor_frame_t *now,
 }
 
 /* Current control -> modulation -> duties. */
-static inline __attribute__((always_inline)) void
-control_currents(drive_t *drive, sample_t *sample, const rotor_frame_t *now, const current_target_t *target)
+static inline FX_INLINED void control_currents(drive_t *drive, sample_t *sample, const rotor_frame_t *now,
+                                               const current_target_t *target)
 {
     const current_control_in_t in = control_inputs(drive, sample, now, target);
     write_duties(drive, sample, now,
@@ -175,15 +174,15 @@ static rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *sample, int32_t an
 }
 
 /* During the pulses only the monitors of the samples act: there is no identification and no slow monitor. */
-static __attribute__((noinline, cold)) void apply_pulses(drive_t *drive, sample_t *sample, const rotor_frame_t *now)
+static FX_NOT_INLINED FX_COLD void apply_pulses(drive_t *drive, sample_t *sample, const rotor_frame_t *now)
 {
     const dq_q15_t v = pulses_step(&drive->pulses, &drive->pulses_state, sample->point.i, sample->theta_e);
     write_duties(drive, sample, now, pulses_voltage(v, drive->parameters.modulate.alpha_q31, now->v_dc), NULL);
     reset_control(drive, sample);
 }
 
-static __attribute__((noinline, cold)) void control_checked(drive_t *drive, sample_t *sample, const rotor_frame_t *now,
-                                                            const current_target_t *target)
+static FX_NOT_INLINED FX_COLD void control_checked(drive_t *drive, sample_t *sample, const rotor_frame_t *now,
+                                                   const current_target_t *target)
 {
     if (turning_control_used(&drive->motor->turning_control)) {
         const current_control_out_t wanted = control_turning(drive, sample, now, target);
@@ -194,7 +193,7 @@ static __attribute__((noinline, cold)) void control_checked(drive_t *drive, samp
     count_since_enable(&drive->fast, sample);
 }
 
-static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, sample_t *sample, int32_t angle_step)
+static FX_NOT_INLINED FX_COLD void run_period_checked(drive_t *drive, sample_t *sample, int32_t angle_step)
 {
     const command_t *command = command_box_read(&drive->commands);
     fast_state_t *fast = &drive->fast;
@@ -219,7 +218,7 @@ static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, s
     publish_sample(drive, sample);
 }
 
-static __attribute__((noinline, cold)) void run_period_not_settled(drive_t *drive)
+static FX_NOT_INLINED FX_COLD void run_period_not_settled(drive_t *drive)
 {
     const command_t *command = command_box_read(&drive->commands);
     if (command->run == (uint8_t)BRIDGE_OFF) {
@@ -231,16 +230,16 @@ static __attribute__((noinline, cold)) void run_period_not_settled(drive_t *driv
 }
 
 /* The usual period. With link-time optimisation all of its stages are compiled into this function. */
-__attribute__((flatten)) void fast_isr(drive_t *drive)
+FX_INLINES_CALLS void fast_isr(drive_t *drive)
 {
     const command_t *command = command_box_read(&drive->commands);
-    if (__builtin_expect(((uint8_t)drive->fast.is_settled & command->run) == 0U, 0)) {
+    if (((uint8_t)drive->fast.is_settled & command->run) == 0U) {
         run_period_not_settled(drive);
         return;
     }
     sample_t *sample = sample_box_begin(&drive->samples);
     const acquired_t acquired = acquire_sample(drive, sample, true);
-    if (__builtin_expect(!acquired.within_limits, 0)) {
+    if (!acquired.within_limits) {
         run_period_checked(drive, sample, acquired.angle_step);
         return;
     }

@@ -2,6 +2,7 @@
 #include "drive/publish.h"
 
 #include "drive/mrai/mrai_seam.h"
+#include "fx/codegen.h"
 
 #define SILENT_STEPS_MAX 2U /* whole steps without a command: 2 to 3 ms, as task and window are not in step */
 
@@ -11,7 +12,7 @@ static void check_task(drive_t *drive)
 {
     fast_state_t *fast = &drive->fast;
     const uint32_t generation = drive->commands.generation;
-    if (__builtin_expect(generation != fast->command_seen, 1)) {
+    if (generation != fast->command_seen) {
         fast->command_seen = generation;
         fast->silent_steps = 0;
     } else if (command_box_read(&drive->commands)->run != (uint8_t)BRIDGE_OFF) {
@@ -42,7 +43,7 @@ static void hand_over_window(drive_t *drive, uint32_t generation, uint32_t perio
 
 /* A sensor that repeats its angle may have failed: the next period checks it, outside the usual route. Not inlined: a
  * branch that is not taken costs one instruction, the inlined code three conditional ones in every period. */
-static __attribute__((noinline, cold)) void leave_usual_route(drive_t *drive)
+static FX_NOT_INLINED FX_COLD void leave_usual_route(drive_t *drive)
 {
     if (angle_tracker_may_stick(&drive->period.angle_tracker, &drive->fast.angle_tracker)) {
         drive->fast.is_settled = false;
@@ -54,7 +55,7 @@ static inline void watch_angle(drive_t *drive, uint32_t theta_m)
     angle_tracker_state_t *tracker = &drive->fast.angle_tracker;
     const uint32_t before = tracker->theta_m;
     tracker->theta_m = theta_m;
-    if (__builtin_expect(theta_m == before, 0)) {
+    if (theta_m == before) {
         leave_usual_route(drive);
     }
 }
@@ -65,9 +66,9 @@ void publish_sample(drive_t *drive, const sample_t *sample)
     watch_angle(drive, sample->theta_m);
     const uint32_t generation = sample_box_publish(&drive->samples);
     const bool completes_step = generation == fast->step_end;
-    if (__builtin_expect(mrai_is_chosen(drive), 0)) {
+    if (mrai_is_chosen(drive)) {
         mrai_offer(drive, sample, generation);
-        if (__builtin_expect(completes_step, 0)) {
+        if (completes_step) {
             identify_window_invalidate(&fast->window); /* the next one would lack its first sample */
             begin_step(drive, generation + drive->period.periods_per_step);
         }
@@ -81,7 +82,7 @@ void publish_sample(drive_t *drive, const sample_t *sample)
         .theta = sample->theta_e,
     };
     identify_window_add(&fast->window, &in);
-    if (__builtin_expect(completes_step, 0)) {
+    if (completes_step) {
         const uint32_t periods = drive->period.periods_per_step;
         identify_window_end(&fast->window, &in);
         hand_over_window(drive, generation, periods);

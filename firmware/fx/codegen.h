@@ -24,6 +24,12 @@
  *                     point of the sine table             2            2 (1 kHz task: 11)
  *   FX_PADDING_WORD   sample and command                               9 to 11
  *   FX_PADDING_FLAG   sample                                           2
+ * The following save, measured without all uses of one of them at once (the drive's program of tools/fluxtrue bench):
+ *   FX_USUALLY                1.4 instructions of the tick, 5 of its maximum, with the look-up's hints
+ *   FX_COLD                   6 instructions of the fast ISR, 234 bytes of the control library
+ *   FX_NOT_INLINED            210 bytes of the control library; the fast ISR would have 1 less without
+ *   FX_INLINED                104 instructions of the 1 kHz task
+ *   FX_INLINES_CALLS          108 instructions of the fast ISR
  * Source   our own measurement; Arm v7-M ARM A7.7.50 (LDRD needs word alignment only)
  * Units    none
  * Range    every value and every address of two words
@@ -34,6 +40,17 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+
+/* The compiler places the code of the other case out of the way of the usual one. */
+#define FX_USUALLY(condition) __builtin_expect((condition), 1)
+
+/* Of a function: a call of it is rare, so that it is compiled for size and its callers keep their registers. */
+#define FX_COLD __attribute__((cold))
+/* One copy of its instructions for all callers. */
+#define FX_NOT_INLINED __attribute__((noinline))
+/* A copy of its instructions in each caller, or in this function those of everything that it calls. */
+#define FX_INLINED __attribute__((always_inline))
+#define FX_INLINES_CALLS __attribute__((flatten))
 
 /* The same value in a register, opaque to the compiler: it neither recomputes the value nor folds it into other
  * operations, and a branch that computes it stays a branch. */

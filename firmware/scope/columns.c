@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "scope/columns.h"
 
+#include "fx/codegen.h"
+
 #define FROM_STEP sizeof(sample_t)
 
 /* Places below FROM_STEP are in the period's sample, the others in the values of the step. */
@@ -42,8 +44,8 @@ column_t column_of(const capture_t *capture, const capture_source_t *source, uin
 
 /* At least one row. The number of signals is a constant: their places stay in registers, and a value takes two
  * instructions. */
-static inline __attribute__((always_inline)) void copy_each(int16_t *first, rows_t rows, const uint8_t *places_in_row,
-                                                            const uint32_t signals)
+static inline FX_INLINED void copy_each(int16_t *first, rows_t rows, const uint8_t *places_in_row,
+                                        const uint32_t signals)
 {
     size_t place[CAPTURE_SIGNALS_MAX];
 #pragma GCC unroll 8
@@ -70,7 +72,7 @@ static inline __attribute__((always_inline)) void copy_each(int16_t *first, rows
         break;
 
 /* Not inlined: within another function there would be too few registers. */
-static __attribute__((noinline)) void copy_rows(int16_t *to, rows_t rows, const uint8_t *place, uint32_t signals)
+static FX_NOT_INLINED void copy_rows(int16_t *to, rows_t rows, const uint8_t *place, uint32_t signals)
 {
     switch (signals) {
         COPY(1U)

@@ -12,12 +12,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "fx/codegen.h"
 #include "fx/q.h"
 
 /* Inlined: calls would add some 100 instructions to a step of the 1 kHz task. Without optimisation, as in the build
  * that measures coverage, it is a function; otherwise its branches would be counted in every caller. */
 #ifdef __OPTIMIZE__
-#define DEBOUNCE_INLINE __attribute__((always_inline)) static inline
+#define DEBOUNCE_INLINE FX_INLINED static inline
 #else
 #define DEBOUNCE_INLINE static inline
 #endif

@@ -3,6 +3,7 @@
  * task. */
 #include "drive/mrai/mrai_seam.h"
 #include "drive/slow_monitors.h"
+#include "fx/codegen.h"
 #include "hal/adc.h"
 #include "hal/angle.h"
 #include "hal/irq.h"
@@ -103,7 +104,7 @@ static void start(void)
     SYST_CSR = SYST_RUN;
 }
 
-__attribute__((noinline)) int main(void)
+FX_NOT_INLINED int main(void)
 {
     static motor_t without_machine;
     without_machine = motor;

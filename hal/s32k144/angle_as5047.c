@@ -77,7 +77,7 @@ uint32_t hal_angle_read(void)
 {
     uint32_t frame;
     const uint32_t frames = serial_angle_read(AS5047_READ_ANGLE, &frame);
-    if (__builtin_expect(frames != 0U && as5047_is_valid(frame), 1)) {
+    if (frames != 0U && as5047_is_valid(frame)) {
         travel_take(&encoder, as5047_angle(frame), frames == 1U);
     } else {
         travel_predict(&encoder);

@@ -55,7 +55,7 @@ float angle_first_speed(void)
 uint32_t hal_angle_read(void)
 {
     uint32_t frame;
-    if (__builtin_expect(serial_angle_read(ANY_WORD, &frame) != 0U, 1)) {
+    if (serial_angle_read(ANY_WORD, &frame) != 0U) {
         position = ad2s1210_decode(frame);
         missing = 0;
     } else {

@@ -48,7 +48,7 @@ uint32_t hal_angle_read(void)
 {
     const angle_counts_t counts = sampling_angle();
     const sincos_t at = sincos_scaled(counts.sine, counts.cosine);
-    if (__builtin_expect(sincos_is_valid(at), 1)) {
+    if (sincos_is_valid(at)) {
         travel_take(&sensor, sincos_angle(at), true);
     } else {
         travel_predict(&sensor);

@@ -4,6 +4,7 @@
 #include <stdint.h>
 
 #include "ecu/ecu.h"
+#include "fx/codegen.h"
 #include "hal/angle.h"
 #include "hal/s32k144/after_reset.h"
 #include "hal/s32k144/angle.h"
@@ -45,7 +46,7 @@ static volatile union {
 static bool started; /* the PWM, and with it the fast ISR */
 
 /* The gate driver's flag is cleared first and the fault raised afterwards, so that a fault in between is not lost. */
-static __attribute__((noinline, cold)) void alarms_take(void)
+static FX_NOT_INLINED FX_COLD void alarms_take(void)
 {
     if (alarms.gate_driver) {
         alarms.gate_driver = false;
@@ -65,7 +66,7 @@ static __attribute__((noinline, cold)) void alarms_take(void)
 
 void adc_handler(void)
 {
-    if (__builtin_expect(alarms.any != 0U, 0)) {
+    if (alarms.any != 0U) {
         alarms_take();
     }
     fast_isr(&ecu.drive);
@@ -201,7 +202,7 @@ static void continue_short_circuit(void)
 
 /* Separate from the reset handler, so that no floating-point instruction is moved before the FPU is enabled. What needs
  * time comes after the short circuit that a fast machine needs. */
-__attribute__((noinline)) int main(void)
+FX_NOT_INLINED int main(void)
 {
     pwm_config_t pwm = stopped;
     const bool possible = timing(&pwm);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/s32k144/nvm.h"
 
+#include "fx/codegen.h"
 #include "hal/nvm.h"
 #include "hal/s32k144/clock.h"
 #include "hal/s32k144/core.h"
@@ -46,7 +47,7 @@ static void discard_cached(void)
 }
 
 /* Not inlined: the only place that calls through an address (budget.toml). */
-static __attribute__((noinline)) bool flash_command(uint32_t code, uint32_t slot, uint32_t offset)
+static FX_NOT_INLINED bool flash_command(uint32_t code, uint32_t slot, uint32_t offset)
 {
     const uint32_t address = COMMAND_BASE + slot * HAL_NVM_SLOT_SIZE + offset;
     FTFC->FCCOB0 = (uint8_t)code;

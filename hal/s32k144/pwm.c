@@ -199,7 +199,7 @@ static inline void pulse(volatile uint32_t *from, volatile uint32_t *to, uint32_
 {
     const uint32_t ticks = (duty * period + half) >> 15;
     uint32_t rise = (period - ticks) >> 1;
-    if (__builtin_expect(ticks == 0U, 0)) {
+    if (ticks == 0U) {
         rise = (uint32_t)fx_in_register((int32_t)period); /* a branch, free in every other period */
     }
     *from = rise;
@@ -222,7 +222,7 @@ void hal_pwm_enable(bool on)
 {
     /* The short circuit after a gate-driver fault at speed: switching was enabled, but the timer has ended it. */
     const bool again = on && ended_by_fault && is_fault_over();
-    if (__builtin_expect(on == bridge.switching && !again && held == 0U, 1)) {
+    if (on == bridge.switching && !again && held == 0U) {
         pending = false;
         return;
     }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/s32k144/travel.h"
 
+#include "fx/codegen.h"
 #include "signal/counter.h"
 
 /* Debuggers find the counter by its name. */
@@ -9,7 +10,7 @@ struct {
 } angle_errors;
 
 /* The rotor is assumed to have moved as in the period before. Not inlined: rare, and the usual path stays short. */
-__attribute__((noinline, cold)) void travel_predict(travel_t *sensor)
+FX_NOT_INLINED FX_COLD void travel_predict(travel_t *sensor)
 {
     sensor->last += (uint32_t)sensor->travel;
     count_up(&sensor->invalid);

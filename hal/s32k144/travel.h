@@ -32,7 +32,7 @@ void travel_predict(travel_t *sensor);
 /** One valid sample. It gives the travel per period only if now and last are one period apart (`consecutive`). */
 static inline void travel_take(travel_t *sensor, uint32_t now, bool consecutive)
 {
-    if (__builtin_expect(consecutive && sensor->invalid == 0U, 1)) {
+    if (consecutive && sensor->invalid == 0U) {
         sensor->travel = (int32_t)(now - sensor->last);
     }
     sensor->last = now;

@@ -198,6 +198,8 @@ def test_a_readme_with_another_order_than_the_table_is_found(tree: Path, text: s
         ("hal/bad.h", "\n" * 61, "at most 60"),
         ("firmware/types/bad.h", "\n" * 81, "at most 80"),
         ("firmware/drive/bad.c", '__asm__("" : "+r"(x));', "'__asm__' belongs into firmware/fx"),
+        ("firmware/drive/bad.c", "if (__builtin_expect(x, 0)) {", "'__builtin_expect' belongs into firmware/fx"),
+        ("hal/host/bad.c", "static __attribute__((noinline, cold)) int f(void)", "'cold' belongs into firmware/fx"),
         ("firmware/safety/bad.c", '__asm__ volatile("");', "'__asm__' belongs into firmware/fx"),
         ("hal/s32k144/bad.c", "x = fx_arch_qadd(a, b);", "'fx_arch_qadd' belongs into firmware/fx"),
     ],

@@ -57,6 +57,7 @@ WORDS = re.compile("|".join(FORBIDDEN), re.IGNORECASE)
 CASED = re.compile(FORBIDDEN[0])
 # Compiler tricks and single instructions have names in firmware/fx, which say what they save (fx/codegen.h).
 TRICK = re.compile(r"\b(__asm__|asm|fx_arch_\w+)\b\s*(?:volatile\b|goto\b)?\s*\(")
+HINT = re.compile(r"(__builtin_expect)\b|__attribute__\(\(.*\b(always_inline|cold|flatten|noinline)\b")
 # Files that have to contain what they forbid.
 EXEMPT = {"tools/checks/style.py", "tests/tools/test_checks.py"}
 
@@ -98,7 +99,8 @@ def guard_problem(path: Path, text: list[str]) -> str | None:
 
 
 def hidden_trick(path: Path, line: str) -> str | None:
-    """An instruction by hand outside firmware/fx. A port may contain some, but not the tricks of the library."""
+    """An instruction by hand, or a hint for the compiler that has a name in fx/codegen.h, outside firmware/fx. A port
+    may contain instructions and must place functions itself, but not use the tricks of the library."""
     if (
         path.suffix not in {".c", ".h"}
         or path.parts[0] not in {"firmware", "hal"}
@@ -106,7 +108,10 @@ def hidden_trick(path: Path, line: str) -> str | None:
     ):
         return None
     found = TRICK.search(line)
-    return found[1] if found and (path.parts[0] == "firmware" or found[1].startswith("fx_arch_")) else None
+    if found and (path.parts[0] == "firmware" or found[1].startswith("fx_arch_")):
+        return found[1]
+    hint = HINT.search(line)
+    return (hint[1] or hint[2]) if hint and "section(" not in line else None
 
 
 def check_file(root: Path, path: Path) -> Iterator[Violation]:

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/adapt/angle_harmonics.h"
 
+#include "fx/codegen.h"
 #include "fx/q.h"
 #include "fx/trig.h"
 #include "signal/seal.h"
@@ -11,7 +12,7 @@
 #define DIFFERENCE_MAX_SHIFT 4  /* 1/16 of the step: a sample one period late deviates by 1/10 of ten periods */
 
 /* cos theta, sin theta, cos 2 theta, sin 2 theta. */
-static __attribute__((noinline)) void harmonics(uint32_t theta, int32_t q31[ANGLE_HARMONICS])
+static FX_NOT_INLINED void harmonics(uint32_t theta, int32_t q31[ANGLE_HARMONICS])
 {
     for (unsigned n = 0; n < ANGLE_HARMONICS; n += 2U) {
         const fx_pair_t at = fx_unit_vector(theta);

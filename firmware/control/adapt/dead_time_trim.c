@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/adapt/dead_time_trim.h"
 
+#include "fx/codegen.h"
 #include "fx/div.h"
 
 #define TIME_CONSTANT_SHIFT 4      /* 16 moves of the trim until 1/e of the error is left */
 #define VARIANCE_MAX_Q30 (1 << 28) /* a quarter of the prior's variance: half of its standard deviation */
 #define RANGE_SHIFT 2              /* base +- base/4 */
 
-static __attribute__((noinline)) int32_t limited(int32_t base, int32_t trim)
+static FX_NOT_INLINED int32_t limited(int32_t base, int32_t trim)
 {
     const int32_t max = base >> RANGE_SHIFT;
     return fx_clamp_q31(trim, -max, max);

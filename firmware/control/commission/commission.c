@@ -2,6 +2,7 @@
 #include "control/commission/commission.h"
 
 #include "control/current/transform.h"
+#include "fx/codegen.h"
 #include "fx/trig.h"
 
 #define CURRENT_TOLERANCE 256 /* q15, besides an eighth of the level */
@@ -72,7 +73,7 @@ static commission_failure_t check_step(const commission_config_t *config, const 
     return (error_d > allowed || error_q > allowed) ? COMMISSION_CURRENT : COMMISSION_GOOD;
 }
 
-static __attribute__((noinline)) int32_t half_mean_q30(const commission_config_t *config, int32_t sum)
+static FX_NOT_INLINED int32_t half_mean_q30(const commission_config_t *config, int32_t sum)
 {
     return fx_sat_q31(((int64_t)sum * config->mean_gain_q31) >> 16) >> 1;
 }

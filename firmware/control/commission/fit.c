@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/commission/fit.h"
 
+#include "fx/codegen.h"
 #include "fx/div.h"
 
 #define UPPER (COMMISSION_LEVELS / 2U)
 #define PER_UPPER Q31(0.2) /* 1/UPPER */
 #define ITERATIONS 20      /* each at least halves the error */
 
-static __attribute__((noinline)) int32_t mul_q30(int32_t a, int32_t b)
+static FX_NOT_INLINED int32_t mul_q30(int32_t a, int32_t b)
 {
     return (int32_t)(((int64_t)a * b + (1 << 29)) >> 30);
 }

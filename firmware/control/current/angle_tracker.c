@@ -8,7 +8,7 @@
 #define STOP_SPEED ((1 << 30) / 50) /* Q30, 0.02 of the speed base: 5 ms with the deceleration of safety/safe_state.c */
 
 /* Advance per period. It wraps beyond half a turn, as the angle does. */
-static __attribute__((noinline, cold)) int32_t advance_at(const angle_tracker_config_t *config, int32_t omega_q30)
+static FX_NOT_INLINED FX_COLD int32_t advance_at(const angle_tracker_config_t *config, int32_t omega_q30)
 {
     return (int32_t)((uint32_t)fx_mulhi(config->pu_to_turn, omega_q30) << config->turn_shift);
 }
@@ -50,8 +50,7 @@ angle_t angle_tracker_follow(const angle_tracker_config_t *config, angle_tracker
     return angle;
 }
 
-__attribute__((cold)) angle_t angle_tracker_step(const angle_tracker_config_t *config, angle_tracker_state_t *state,
-                                                 uint32_t theta_m)
+FX_COLD angle_t angle_tracker_step(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_m)
 {
     angle_t angle;
     if (state->samples >= 2U) {
@@ -74,9 +73,8 @@ typedef struct {
 
 /* Recovers the state before a sample from the state after it. The new prediction is theta~ + step + k_p e, where theta~
  * is the old one and e = theta_e - theta~. Hence e = difference + k_p e; an iteration leaves k_p < 1/8 of the error. */
-static __attribute__((noinline, cold)) before_sample_t state_before_sample(const angle_tracker_config_t *config,
-                                                                           const angle_tracker_state_t *state,
-                                                                           uint32_t theta_e)
+static FX_NOT_INLINED FX_COLD before_sample_t state_before_sample(const angle_tracker_config_t *config,
+                                                                  const angle_tracker_state_t *state, uint32_t theta_e)
 {
     const uint32_t step = (uint32_t)advance_at(config, state->omega_q30);
     const int32_t difference = (int32_t)(theta_e + step - state->predicted);
@@ -89,8 +87,8 @@ static __attribute__((noinline, cold)) before_sample_t state_before_sample(const
 }
 
 /* Undoes the loop's step for this sample. */
-__attribute__((cold)) angle_t angle_tracker_coast(const angle_tracker_config_t *config, angle_tracker_state_t *state,
-                                                  uint32_t theta_e)
+FX_COLD angle_t angle_tracker_coast(const angle_tracker_config_t *config, angle_tracker_state_t *state,
+                                    uint32_t theta_e)
 {
     const before_sample_t at = state_before_sample(config, state, theta_e);
     const angle_t angle = result(theta_e - (uint32_t)at.error, at.step, at.omega_q30, true);
@@ -118,9 +116,8 @@ static angle_repeats_t whose_repeats(const angle_tracker_config_t *config, const
     return (behind - advance <= (int64_t)step * (int32_t)config->lag_steps) ? REPEATS_OF_SENSOR : REPEATS_OF_ROTOR;
 }
 
-__attribute__((cold)) angle_repeat_t angle_tracker_repeated(const angle_tracker_config_t *config,
-                                                            angle_tracker_state_t *state, angle_t *angle,
-                                                            uint32_t period)
+FX_COLD angle_repeat_t angle_tracker_repeated(const angle_tracker_config_t *config, angle_tracker_state_t *state,
+                                              angle_t *angle, uint32_t period)
 {
     const bool in_a_row = period - state->repeat_period == 1U;
     state->repeats = in_a_row ? state->repeats + (state->repeats < UINT16_MAX ? 1U : 0U) : 1U;
@@ -142,14 +139,13 @@ __attribute__((cold)) angle_repeat_t angle_tracker_repeated(const angle_tracker_
     return ANGLE_STANDING;
 }
 
-__attribute__((cold)) bool angle_tracker_may_stick(const angle_tracker_config_t *config,
-                                                   const angle_tracker_state_t *state)
+FX_COLD bool angle_tracker_may_stick(const angle_tracker_config_t *config, const angle_tracker_state_t *state)
 {
     const int64_t step = fx_abs_q31(advance_at(config, state->omega_q30));
     return step * config->stop_periods > config->repeat_max;
 }
 
-__attribute__((noinline, cold)) bool angle_tracker_may_stop(const angle_tracker_state_t *state)
+FX_NOT_INLINED FX_COLD bool angle_tracker_may_stop(const angle_tracker_state_t *state)
 {
     return fx_abs_q31(state->omega_q30) <= STOP_SPEED;
 }

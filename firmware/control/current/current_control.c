@@ -15,8 +15,8 @@ void current_control_reset(current_control_state_t *state)
 }
 
 /* f = psi* - (1 - b)(l i*) + (r/sigma) i*, where l i* is psi* minus the magnet's flux (CC-5). */
-static __attribute__((cold)) int32_t weighted_reference(const current_control_config_t *config, int32_t psi,
-                                                        int32_t psi_magnet, int32_t i_ref)
+static FX_COLD int32_t weighted_reference(const current_control_config_t *config, int32_t psi, int32_t psi_magnet,
+                                          int32_t i_ref)
 {
     const int32_t l_i = fx_sat_q15_word(psi - psi_magnet);
     const int32_t reduction = l_i - fx_mul_q15(config->setpoint_weight, l_i);
@@ -108,7 +108,7 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     /* Q25 * Q22 = Q15, below 2^30. */
     const dq_q15_t v = {fx_mulhi(per_v_max_q25, u_q22.d), fx_mulhi(per_v_max_q25, u_q22.q)};
     const fx_pair_t v_pair = fx_pair(fx_sat_q15_word(v.d), fx_sat_q15_word(v.q));
-    if (__builtin_expect((uint32_t)fx_dot2(v_pair, v_pair) < config->clear_q30, 1)) {
+    if (FX_USUALLY((uint32_t)fx_dot2(v_pair, v_pair) < config->clear_q30)) {
         *state = next;
         return (current_control_out_t){.u = u, .v = v_pair, .clear = true};
     }

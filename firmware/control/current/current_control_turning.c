@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/current/current_control_turning.h"
 
+#include "fx/codegen.h"
 #include "fx/trig.h"
 
 #define Q29_PER_Q15 16384
@@ -13,7 +14,7 @@ void turning_control_reset(turning_control_state_t *state, const flux_point_t *f
 
 /* e^(j angle) end - e^(-j angle) begin, the flux that takes the machine from begin to end (CC-17). It has half the
  * scale of the arguments, because the product of a Q29 and a Q15 number is Q28. */
-static __attribute__((noinline)) void across(const dq_q29_t *end, const dq_q29_t *begin, uint32_t angle, dq_q28_t *flux)
+static FX_NOT_INLINED void across(const dq_q29_t *end, const dq_q29_t *begin, uint32_t angle, dq_q28_t *flux)
 {
     const fx_pair_t at = fx_unit_vector(angle);
     const int32_t cos = (int32_t)at;
@@ -29,8 +30,8 @@ static int32_t approach(const turning_control_config_t *config, int32_t r_q29, i
 }
 
 /* One axis: the voltage, Q30, limited to V_b (CC-18); the integral part (CC-19). Q29 * Q28 = Q25, below 64. */
-static __attribute__((noinline)) int32_t voltage(const turning_control_config_t *config, int32_t *s_q28, int32_t flux,
-                                                 int32_t back, int32_t rotational, int32_t i)
+static FX_NOT_INLINED int32_t voltage(const turning_control_config_t *config, int32_t *s_q28, int32_t flux,
+                                      int32_t back, int32_t rotational, int32_t i)
 {
     const int32_t fed_back = fx_mulhi(config->feedback_q32, back);
     const int32_t wanted = flux + fed_back + *s_q28 + fx_mulhi(config->drop_q29, i * 65536);

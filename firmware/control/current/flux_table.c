@@ -3,9 +3,10 @@
 
 #include <stddef.h>
 
+#include "fx/codegen.h"
 #include "fx/q.h"
 
-__attribute__((cold)) motor_check_t flux_table_check(const flux_table_config_t *config)
+FX_COLD motor_check_t flux_table_check(const flux_table_config_t *config)
 {
     if (!config->l_d || !config->l_q || !config->l_qq || !config->g || !config->psi_f0) {
         return MOTOR_CHECK_FLUX_TABLE_MISSING;
@@ -45,7 +46,7 @@ flux_point_t flux_table_step(const flux_table_config_t *config, dq_q15_t i)
     };
 }
 
-__attribute__((cold)) flux_inductances_t flux_table_inductances(const flux_table_config_t *config, dq_q15_t i)
+FX_COLD flux_inductances_t flux_table_inductances(const flux_table_config_t *config, dq_q15_t i)
 {
     const fx_cell_t cell = cell_of(config, i);
     const uint32_t ny = config->mesh.ny;

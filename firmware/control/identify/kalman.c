@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/identify/kalman.h"
 
+#include "fx/codegen.h"
+
 #define X_MAX_Q27 (4 * IDENTIFY_ONE_Q27)
 #define INNOVATION_MAX_Q30 (1 << 26)
 #define S_MIN_Q60 (INT64_C(1) << 38) /* the square of the smallest noise that identify_check() accepts */
@@ -14,13 +16,13 @@ typedef struct {
 } reciprocal_t;
 
 /* x 2^-n, half up, n = 1 ... 31. Not inlined, like dot(): one copy takes less memory. */
-static __attribute__((noinline)) int32_t round_shift(int64_t x, unsigned n)
+static FX_NOT_INLINED int32_t round_shift(int64_t x, unsigned n)
 {
     const uint32_t half = ((uint32_t)x >> (n - 1U)) & 1U;
     return fx_add_q31(fx_sat_q31(x >> n), (int32_t)half);
 }
 
-static __attribute__((noinline)) int64_t dot(const int32_t *a, const int32_t *b)
+static FX_NOT_INLINED int64_t dot(const int32_t *a, const int32_t *b)
 {
     int64_t sum = 0;
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {

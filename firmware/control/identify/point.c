@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/identify/point.h"
 
+#include "fx/codegen.h"
+
 /* Q15 * Q32 = Q47 -> Q31; |twice_sum| < 2^22. Not inlined, here and below: two calls take less memory than two
  * copies. */
-static __attribute__((noinline)) q31_t mean(const identify_config_t *config, int32_t twice_sum)
+static FX_NOT_INLINED q31_t mean(const identify_config_t *config, int32_t twice_sum)
 {
     return fx_sat_q31(((int64_t)twice_sum * config->mean_gain_q32) >> 16);
 }
@@ -22,8 +24,7 @@ static int32_t acting_voltage(const identify_config_t *config, int32_t sum, int3
 }
 
 /* d psi/dt over the window, Q30; (ID-3) takes it with w T_s/2 cot(w T_s/2). */
-static __attribute__((noinline)) int32_t flux_rate(const identify_config_t *config, int32_t first, int32_t last,
-                                                   q31_t sinc)
+static FX_NOT_INLINED int32_t flux_rate(const identify_config_t *config, int32_t first, int32_t last, q31_t sinc)
 {
     /* Q15 * Q28 = Q43, limited to 1 pu. */
     const q31_t rate = fx_sat_q31(((int64_t)(last - first) * config->rate_gain_q28) >> 12);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/mrai/mrai.h"
 
+#include "fx/codegen.h"
 #include "fx/q.h"
 
 /* Limit of the observer error: 4 pu. With slow poles e = T_s w dpsi/(2 s2) is large: 1.5 pu at full speed for a magnet
@@ -22,7 +23,7 @@ static bool are_limits_valid(q31_t lo, q31_t hi)
     return lo < hi && lo >= Q31(-0.5) && hi <= Q31(0.5);
 }
 
-__attribute__((cold)) motor_check_t mrai_check(const mrai_config_t *c)
+FX_COLD motor_check_t mrai_check(const mrai_config_t *c)
 {
     if (c->r0 <= 0 || c->pole_gain <= 0 || c->period <= 0 || c->period > Q31(0.78) || c->flux_gain < 0 ||
         c->resistance_gain < 0 || c->flux_proportional_q24 < 0 || c->resistance_proportional_q24 < 0) {
@@ -112,8 +113,8 @@ static void begin_period(const mrai_schedule_t *schedule, mrai_state_t *state, c
     state->predicted_q_q27 = predicted_q;
 }
 
-__attribute__((cold)) void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
-                                      const operating_point_t *in)
+FX_COLD void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
+                        const operating_point_t *in)
 {
     dq_q15_t psi;
     const dq_q27_t half = half_voltage(config, in, weighted(&in->i), state->psi_delta, state->r_delta, &psi);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/mrai/schedule.h"
 
+#include "fx/codegen.h"
 #include "fx/div.h"
 #include "fx/q.h"
 #include "fx/vec.h"
@@ -16,7 +17,7 @@ static int32_t flux_step(const mrai_config_t *config, q15_t omega)
 }
 
 /* 2 k_r/(omega_b n), n = 4 i_d^2 + i_q^2, in Q26 (MR-10): a 256th in Q31 over Q28 is a 32nd in Q31. */
-static __attribute__((noinline)) int32_t resistance_step(const mrai_config_t *config, const operating_point_t *sample)
+static FX_NOT_INLINED int32_t resistance_step(const mrai_config_t *config, const operating_point_t *sample)
 {
     const q15_t d = (q15_t)sample->i.d;
     const q15_t q = (q15_t)sample->i.q;
@@ -32,7 +33,7 @@ static int32_t minus_voltage_q28(const mrai_config_t *config, q31_t omega)
 }
 
 /* |drift|/full, at most 1: share of the adaptation that is still to come (MR-18). */
-static __attribute__((noinline)) q15_t drift_share(q31_t drift, q31_t full)
+static FX_NOT_INLINED q15_t drift_share(q31_t drift, q31_t full)
 {
     return fx_q15_from_q31(fx_div_q31(fx_abs_q31(drift), full));
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/mrai/torque_estimate.h"
 
+#include "fx/codegen.h"
 #include "fx/q.h"
 
 #define Q24_PER_Q15 512
@@ -18,7 +19,7 @@ void torque_estimate_add(torque_sum_t *sum, const dq_q15_t *i, const flux_point_
 
 /* Rounded half up for either sign. Each term of the sum was truncated, by half an LSB of Q24 on average, which count/2
  * restores. */
-__attribute__((cold)) q15_t torque_estimate_mean(torque_mean_t *state, const torque_sum_t *sum)
+FX_COLD q15_t torque_estimate_mean(torque_mean_t *state, const torque_sum_t *sum)
 {
     const uint32_t count = (uint32_t)sum->count - (uint32_t)state->last.count;
     const int32_t total_q24 = fx_sub_wrap(sum->sum_q24, state->last.sum_q24);

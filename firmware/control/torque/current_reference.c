@@ -3,6 +3,7 @@
 
 #include <stddef.h>
 
+#include "fx/codegen.h"
 #include "fx/div.h"
 #include "fx/q.h"
 #include "fx/vec.h"
@@ -45,15 +46,15 @@ static dq_q15_t limit_to_current_circle(dq_q15_t i, q15_t i_max)
     return (dq_q15_t){fx_max_s32(i.d, -i_max), fx_leg(i_max, i.d)};
 }
 
-static __attribute__((noinline)) dq_q15_t currents_from_table(const current_reference_config_t *config, int32_t torque,
-                                                              int32_t psi)
+static FX_NOT_INLINED dq_q15_t currents_from_table(const current_reference_config_t *config, int32_t torque,
+                                                   int32_t psi)
 {
     const fx_cell_t cell = fx_cell(&config->grid, torque, psi);
     return (dq_q15_t){fx_cell_interp(config->i_d, config->grid.ny, cell),
                       fx_cell_interp(config->i_q, config->grid.ny, cell)};
 }
 
-static __attribute__((noinline)) int32_t torque_max_from_table(const current_reference_config_t *config, int32_t psi)
+static FX_NOT_INLINED int32_t torque_max_from_table(const current_reference_config_t *config, int32_t psi)
 {
     bool clamped = false;
     return fx_lookup1(&config->torque_max, psi, &clamped);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/torque/limit.h"
 
+#include "fx/codegen.h"
 #include "fx/div.h"
 #include "fx/q.h"
 #include "fx/vec.h"
@@ -67,7 +68,7 @@ static void limit_to(bound_t *bound, int32_t limit, uint32_t reason)
 }
 
 /* (power -+ loss)/|w| (LM-3). Q15_MAX means that no limit is set. */
-static __attribute__((noinline)) void limit_by_power(bound_t *bound, int32_t limit, int32_t loss, int32_t speed)
+static FX_NOT_INLINED void limit_by_power(bound_t *bound, int32_t limit, int32_t loss, int32_t speed)
 {
     if (limit < Q15_MAX) {
         const int32_t power = fx_usat_q15_word(limit - loss);
@@ -75,21 +76,20 @@ static __attribute__((noinline)) void limit_by_power(bound_t *bound, int32_t lim
     }
 }
 
-static __attribute__((noinline)) void limit_by_factor(bound_t *bound, int32_t factor, uint32_t reason)
+static FX_NOT_INLINED void limit_by_factor(bound_t *bound, int32_t factor, uint32_t reason)
 {
     if (factor < Q15_MAX) {
         limit_to(bound, fx_mul_q15(bound->rated, factor), reason);
     }
 }
 
-static __attribute__((noinline)) void limit_by_line(bound_t *bound, const derating_line_t *at, int32_t x,
-                                                    uint32_t reason)
+static FX_NOT_INLINED void limit_by_line(bound_t *bound, const derating_line_t *at, int32_t x, uint32_t reason)
 {
     limit_by_factor(bound, derating_factor(at, x), reason);
 }
 
-static __attribute__((noinline)) void limit_by_temperature(bound_t *bound, const derating_line_t *at, int16_t dC,
-                                                           bool *was_known, uint32_t reason)
+static FX_NOT_INLINED void limit_by_temperature(bound_t *bound, const derating_line_t *at, int16_t dC, bool *was_known,
+                                                uint32_t reason)
 {
     if (temperature_is_known(dC)) {
         *was_known = true;

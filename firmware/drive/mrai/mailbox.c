@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/mrai/mrai_seam.h"
+#include "fx/codegen.h"
 #include "hal/irq.h"
 
 #define OVERRUNS_TO_FAULT 3U /* periods since the last point that was not dropped */
 
 /* The interrupt still uses the previous point: this one is dropped, and the law restarts with the next. */
-static __attribute__((noinline, cold)) void count_overrun(drive_t *drive, uint32_t generation)
+static FX_NOT_INLINED FX_COLD void count_overrun(drive_t *drive, uint32_t generation)
 {
     mrai_mailbox_t *mailbox = &drive->mrai.mailbox;
     mailbox->overruns++;
@@ -18,7 +19,7 @@ static __attribute__((noinline, cold)) void count_overrun(drive_t *drive, uint32
 void mrai_offer(drive_t *drive, const sample_t *sample, uint32_t generation)
 {
     mrai_mailbox_t *mailbox = &drive->mrai.mailbox;
-    if (__builtin_expect(mailbox->generation != drive->mrai.isr.finished, 0)) {
+    if (mailbox->generation != drive->mrai.isr.finished) {
         count_overrun(drive, generation);
         return;
     }

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/mrai/mrai_seam.h"
 #include "drive/mrai/schedule_box.h"
+#include "fx/codegen.h"
 
 /* If the bridge was off, so that the acting voltage is unknown, or the previous point was dropped, the observer
  * restarts from the measured currents and keeps the identified parameters. After a reset it restarts with parameters of
  * zero. */
-static __attribute__((noinline, cold)) void restart(drive_t *drive, const mrai_schedule_t *schedule)
+static FX_NOT_INLINED FX_COLD void restart(drive_t *drive, const mrai_schedule_t *schedule)
 {
     mrai_isr_state_t *state = &drive->mrai.isr;
     if (drive->request.identification_resets != state->identification_resets) {
@@ -24,9 +25,8 @@ void mrai_isr(drive_t *drive)
     mrai_isr_state_t *state = &drive->mrai.isr;
     const mrai_schedule_t *schedule = schedule_box_read(&drive->mrai.schedules);
 
-    if (__builtin_expect(!mailbox->acting || generation - state->finished != 1U ||
-                             drive->request.identification_resets != state->identification_resets,
-                         0)) {
+    if (!mailbox->acting || generation - state->finished != 1U ||
+        drive->request.identification_resets != state->identification_resets) {
         restart(drive, schedule);
     } else {
         mrai_step(&drive->mrai_parameters, schedule, &state->law, point);
