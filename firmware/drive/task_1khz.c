@@ -159,6 +159,12 @@ static dq_q15_t next_references(drive_t *drive, const snapshot_t *snapshot)
     return compute_references(drive, snapshot);
 }
 
+/* The target makes 21/32 of the rotational voltage (CC-24), but all of what the tables do not contain. */
+static int32_t turning_flux(const snapshot_t *snapshot)
+{
+    return 32 * snapshot->psi_d_error / 21;
+}
+
 /* Writes the command for the fast ISR. commanded: the operating point that follows from it. */
 static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_t faults, operating_point_t *commanded)
 {
@@ -174,7 +180,7 @@ static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_
         commanded->flux = flux_table_step(&drive->motor->flux_table, commanded->i);
         task->i_ref = commanded->i;
         task->psi_ref = (dq_q15_t){commanded->flux.psi_d, commanded->flux.psi_q};
-        command.target = current_control_target(&drive->parameters.current_control, commanded->i, &commanded->flux);
+        command.target = current_control_target(&drive->parameters.current_control, commanded, turning_flux(snapshot));
     } else {
         reset_torque_path(drive);
     }

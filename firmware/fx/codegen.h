@@ -22,7 +22,7 @@
  *                     timer of hal/s32k144/pwm.c                       2
  *                     slot of the command                              2
  *                     point of the sine table             2            2 (1 kHz task: 11)
- *   FX_PADDING_WORD   sample and command                               9 to 11
+ *   FX_PADDING_WORD   sample                                           9 to 11
  *   FX_PADDING_FLAG   sample                                           2
  * Source   our own measurement; Arm v7-M ARM A7.7.50 (LDRD needs word alignment only)
  * Units    none

@@ -156,7 +156,7 @@ static void task(twin_t *twin)
     if (twin->run_state == TWIN_RUN) {
         torque_path(twin);
         twin->i_ref = twin->current_mode ? (twin_dq_t){twin->id_command, twin->iq_command} : twin->reference.i_ref;
-        twin->target = twin_current_target(&twin->motor, twin->i_ref);
+        twin->target = twin_current_target(&twin->motor, twin->i_ref, twin->sample.omega, twin->psi_delta);
         next.i = twin->i_ref;
         next.flux = twin_flux_table(&twin->motor, next.i);
         twin->psi_ref = (twin_dq_t){next.flux.psi_d, next.flux.psi_q};
@@ -200,12 +200,12 @@ static void collect(twin_t *twin, bool pulses_limited)
 static void bridge_on(twin_t *twin, const twin_angle_t *angle, double out[4])
 {
     const twin_mrai_in_t *now = &twin->sample;
-    const twin_current_in_t request = {twin->target, &now->flux, now->omega, twin->psi_delta, twin->v_dc};
+    const twin_current_in_t request = {twin->target, &now->flux, now->omega, twin->v_dc};
     motor_si_t motor = twin->motor;
     motor.dead_time_duty *= twin->compensation;
     if (motor.turning_feedback > 0.0) {
         motor.knee_A = fmax(motor.knee_A, motor.turning_knee_A_per_rad * fabs(angle->step));
-        const twin_turning_in_t far = {request, now->i, angle->step};
+        const twin_turning_in_t far = {request, now->i, angle->step, twin->psi_delta};
         twin->u = twin_turning_control(&motor, &twin->turning, &far);
     } else {
         twin->u = twin_current_control(&motor, &twin->current, &request);

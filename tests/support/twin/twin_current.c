@@ -35,15 +35,24 @@ static twin_dq_t circle(twin_dq_t u, double u_max, bool more_flux, double omega)
     return (twin_dq_t){u_max * limited.d, u_max * twin_clamp(q, -left, left)};
 }
 
-twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref)
+/* Of the rotational voltage, by the measured flux. */
+static const double measured_share = 11.0 / 32.0;
+
+twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref, double omega, double psi_delta)
 {
     const twin_flux_t at = twin_flux_table(motor, i_ref);
     const double less = 1.0 - motor->setpoint_weight;
     const double drop = motor->r_ohm_20 / motor->sigma_rad_s;
+    const double rest = (1.0 - measured_share) * omega;
+    const double per_sigma = 1.0 / motor->sigma_rad_s;
+    const double d = at.psi_d - less * at.l_d * i_ref.d;
+    const double q = at.psi_q - less * at.l_q * i_ref.q;
     return (twin_target_t){
         .psi = {at.psi_d, at.psi_q},
-        .weighted = {at.psi_d - less * at.l_d * i_ref.d + drop * i_ref.d,
-                     at.psi_q - less * at.l_q * i_ref.q + drop * i_ref.q},
+        .weighted = {d + drop * i_ref.d - per_sigma * rest * q,
+                     q + drop * i_ref.q + per_sigma * (rest * d + omega * psi_delta)},
+        .turn = measured_share * omega,
+        .integral_turn = motor->integral_ratio * rest,
     };
 }
 
@@ -52,15 +61,15 @@ twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *st
     const twin_flux_t *f = in->flux;
     const twin_target_t *to = &in->target;
     const double sigma = motor->sigma_rad_s;
-    const double ud = sigma * (to->weighted.d - f->psi_d) + state->s.d - in->omega * f->psi_q;
-    const double uq = sigma * (to->weighted.q - f->psi_q) + state->s.q + in->omega * (f->psi_d + in->psi_delta);
+    const double ud = sigma * (to->weighted.d - f->psi_d) + state->s.d - to->turn * f->psi_q;
+    const double uq = sigma * (to->weighted.q - f->psi_q) + state->s.q + to->turn * f->psi_d;
     const twin_dq_t e = {to->psi.d - f->psi_d, to->psi.q - f->psi_q};
     const twin_dq_t u = circle((twin_dq_t){ud, uq}, motor->v_ratio * in->v_dc, e.d > 0.0, in->omega);
     const double rounding = 1e-9 * motor->v_base_V;
     state->limited = fabs(u.d - ud) > rounding || fabs(u.q - uq) > rounding;
     const double max = 4.0 * motor->v_ratio * in->v_dc;
-    state->s.d += integral(motor, e.d, twin_clamp(u.d - ud, -max, max));
-    state->s.q += integral(motor, e.q, twin_clamp(u.q - uq, -max, max));
+    state->s.d += integral(motor, e.d, twin_clamp(u.d - ud, -max, max)) - to->integral_turn * e.q;
+    state->s.q += integral(motor, e.q, twin_clamp(u.q - uq, -max, max)) + to->integral_turn * e.d;
     return u;
 }
 
@@ -92,7 +101,7 @@ twin_dq_t twin_turning_control(const motor_si_t *motor, twin_turning_state_t *st
 {
     const twin_current_in_t *c = &in->control;
     const double theta = in->step;
-    const twin_dq_t magnet = {c->psi_delta, 0.0};
+    const twin_dq_t magnet = {in->psi_delta, 0.0};
     const twin_dq_t e = {state->now.d - c->flux->psi_d, state->now.q - c->flux->psi_q};
     const twin_dq_t to = sum(state->next, motor->turning_approach, sum(c->target.psi, -1.0, state->next));
     const twin_dq_t model = between(sum(state->next, 1.0, magnet), sum(to, 1.0, magnet), theta);
