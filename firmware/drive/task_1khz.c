@@ -180,9 +180,12 @@ static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_
         commanded->flux = flux_table_step(&drive->motor->flux_table, commanded->i);
         task->i_ref = commanded->i;
         task->psi_ref = (dq_q15_t){commanded->flux.psi_d, commanded->flux.psi_q};
-        command.target = current_control_target(&drive->parameters.current_control, commanded, turning_flux(snapshot));
+        command.target = current_control_target(&drive->parameters.current_control, commanded, turning_flux(snapshot),
+                                                &task->rotating);
     } else {
         reset_torque_path(drive);
+        const flux_point_t *flux = &commanded->flux;
+        task->rotating = (rotating_flux_t){.psi = {(q15_t)flux->psi_d, (q15_t)flux->psi_q}};
     }
     command.safe = safe_decision_step(drive, snapshot);
     command.upper = safe_decision_is_upper(drive);

@@ -8,6 +8,7 @@
 
 #define HALF_LSB_Q22 64
 #define V_D_MIN Q15(0.7) /* share of the circle that the d axis may always use (CC-11) */
+#define REACHED_SHIFT 4      /* psi_f/16: what is left of a change is made at once (CC-25) */
 #define MEASURED_SHARE_Q5 11 /* m: of the rotational voltage, by the measured flux (CC-24) */
 
 /* Two halfwords that lie side by side, by one load. */
@@ -29,8 +30,24 @@ static inline int32_t proportional_reference(int32_t weighted, q16_t drop_gain, 
     return fx_sat_bits(with_drop * 32768 + turned_q30, 31);
 }
 
+/* (CC-25) */
+static inline void follow(rotating_flux_t *rotating, dq_q15_t to, int32_t psi_magnet)
+{
+    const dq_q15_t change = {to.d - rotating->psi.d, to.q - rotating->psi.q};
+    const int32_t largest = fx_max_s32(fx_abs_q31(change.d), fx_abs_q31(change.q));
+    const int32_t at_once = rotating->behind ? psi_magnet >> REACHED_SHIFT : psi_magnet - (psi_magnet >> 2);
+    int32_t quarters = 4;
+    if (largest > at_once) {
+        quarters = rotating->behind ? 3 : 2;
+    }
+    rotating->behind = quarters < 4;
+    rotating->psi = (dq_q15_halfword_t){fx_sat_q15(rotating->psi.d + ((change.d * quarters) >> 2)),
+                                        fx_sat_q15(rotating->psi.q + ((change.q * quarters) >> 2))};
+}
+
 __attribute__((cold)) current_target_t current_control_target(const current_control_config_t *config,
-                                                              const operating_point_t *at, int32_t psi_delta)
+                                                              const operating_point_t *at, int32_t psi_delta,
+                                                              rotating_flux_t *rotating)
 {
     const fx_pair_t gains = pair_of(config->setpoint_weight, config->integral_gain);
     const int32_t weight_q31 = (int32_t)(gains << 16);
@@ -44,11 +61,12 @@ __attribute__((cold)) current_target_t current_control_target(const current_cont
         turn_q31 = (at->omega >> 5) * MEASURED_SHARE_Q5;
         rest = fx_sat_q15_word((at->omega - turn_q31) / (config->sigma_q24 >> 8)); /* Q31/Q16 */
     }
-    const int32_t turning_d = fx_sat_q15_word(weighted_d + psi_delta);
+    follow(rotating, (dq_q15_t){weighted_d, weighted_q}, at->flux.psi_f0);
+    const int32_t with_magnet = fx_sat_q15_word(rotating->psi.d + psi_delta);
     return (current_target_t){
         .psi = {(q15_t)at->flux.psi_d, (q15_t)at->flux.psi_q},
-        .weighted = {proportional_reference(weighted_d, drop_gain, at->i.d, -(rest * weighted_q)),
-                     proportional_reference(weighted_q, drop_gain, at->i.q, rest * turning_d)},
+        .weighted = {proportional_reference(weighted_d, drop_gain, at->i.d, -(rest * rotating->psi.q)),
+                     proportional_reference(weighted_q, drop_gain, at->i.q, rest * with_magnet)},
         .turn = turn_q31 >> 16,
         .integral_turn = (q15_t)((integral_gain * rest) >> 15),
         .integral_gain = (q15_t)integral_gain,

@@ -5,7 +5,8 @@
  * identified flux. A share m of the rotational voltage follows the measured flux, the rest w' = (1 - m) w the target:
  *   u_d = sigma (f_d - psi_d) + s_d - m w psi_q, s_d += a_i (sigma (psi_d* - psi_d) - w' (psi_q* - psi_q))
  *   u_q = sigma (f_q - psi_q) + s_q + m w psi_d, s_q += a_i (sigma (psi_q* - psi_q) + w' (psi_d* - psi_d))
- *   psi* = tables at i*;  f = psi* - (1 - b) l i* + (r/sigma) i* + j (w' psi* + w dpsi)/sigma
+ *   psi* = tables at i*;  f = psi* - (1 - b) l i* + (r/sigma) i* + j (w' r + w dpsi)/sigma
+ * r follows f's flux: at once in small steps, a large one by half and then by three quarters of the rest (CC-25)
  * (set-point weight b, resistive drop and rotational voltage fed forward). The measured flux is a period and a half old
  * when its voltage acts: with m = 1 the phase margin would fall with speed (CC-24).
  * The error is a flux linkage: sigma (psi* - psi) equals sigma l (i* - i) with l the incremental inductance between
@@ -52,6 +53,12 @@ typedef struct {
     q15_t integral_gain;   /* a_i sigma */
 } current_target_t;
 
+/** r: flux whose rotational voltage the target makes. */
+typedef struct {
+    dq_q15_halfword_t psi;
+    bool behind; /* after a change too large to be made at once */
+} rotating_flux_t;
+
 typedef struct {
     int32_t s_d_q30, s_q_q30;
 } current_control_state_t;
@@ -74,9 +81,10 @@ static inline void current_control_reset(current_control_state_t *state)
     *state = (current_control_state_t){0};
 }
 
-/** at: currents and flux that are wanted, and the speed. psi_delta: identified flux minus the table's, over 1 - m. */
+/** at: currents and flux that are wanted, and the speed. psi_delta: identified flux minus the table's, over 1 - m.
+ * rotating: follows the target; the measured flux before the first call. */
 current_target_t current_control_target(const current_control_config_t *config, const operating_point_t *at,
-                                        int32_t psi_delta);
+                                        int32_t psi_delta, rotating_flux_t *rotating);
 current_control_out_t current_control_step(const current_control_config_t *config, current_control_state_t *state,
                                            const current_control_in_t *in);
 

@@ -445,11 +445,11 @@ current_reference_t __wrap_current_reference_step(const current_reference_config
 }
 
 current_target_t __real_current_control_target(const current_control_config_t *config, const operating_point_t *at,
-                                               int32_t psi_delta);
+                                               int32_t psi_delta, rotating_flux_t *rotating);
 current_target_t __wrap_current_control_target(const current_control_config_t *config, const operating_point_t *at,
-                                               int32_t psi_delta);
+                                               int32_t psi_delta, rotating_flux_t *rotating);
 current_target_t __wrap_current_control_target(const current_control_config_t *config, const operating_point_t *at,
-                                               int32_t psi_delta)
+                                               int32_t psi_delta, rotating_flux_t *rotating)
 {
     static dq_q15_t kept_i_ref;
     const dq_q15_t i_ref = at->i;
@@ -462,10 +462,10 @@ current_target_t __wrap_current_control_target(const current_control_config_t *c
         there.i = kept_i_ref;
     } else {
         kept_i_ref = i_ref;
-        return __real_current_control_target(config, at, psi_delta);
+        return __real_current_control_target(config, at, psi_delta, rotating);
     }
     there.flux = flux_table_step(&under_test->ecu.motor.flux_table, there.i);
-    return __real_current_control_target(config, &there, psi_delta);
+    return __real_current_control_target(config, &there, psi_delta, rotating);
 }
 
 rx_result_t __real_can_rx_frame(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame);

@@ -156,11 +156,13 @@ static void task(twin_t *twin)
     if (twin->run_state == TWIN_RUN) {
         torque_path(twin);
         twin->i_ref = twin->current_mode ? (twin_dq_t){twin->id_command, twin->iq_command} : twin->reference.i_ref;
-        twin->target = twin_current_target(&twin->motor, twin->i_ref, twin->sample.omega, twin->psi_delta);
+        twin->target = twin_current_target(&twin->motor, twin->i_ref, twin->sample.omega, twin->psi_delta,
+                                           &twin->rotating);
         next.i = twin->i_ref;
         next.flux = twin_flux_table(&twin->motor, next.i);
         twin->psi_ref = (twin_dq_t){next.flux.psi_d, next.flux.psi_q};
     } else {
+        twin->rotating = (twin_rotating_t){.psi = {twin->sample.flux.psi_d, twin->sample.flux.psi_q}};
         twin->torque_commanded = 0.0;
         twin->torque_state = (twin_torque_state_t){0};
         twin->reference = (twin_reference_t){.torque_max = twin->motor.torque_max_Nm, .psi_plan = HUGE_VAL};

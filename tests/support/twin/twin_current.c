@@ -38,7 +38,25 @@ static twin_dq_t circle(twin_dq_t u, double u_max, bool more_flux, double omega)
 /* Of the rotational voltage, by the measured flux. */
 static const double measured_share = 11.0 / 32.0;
 
-twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref, double omega, double psi_delta)
+static twin_dq_t sum(twin_dq_t a, double factor, twin_dq_t b)
+{
+    return (twin_dq_t){a.d + factor * b.d, a.q + factor * b.q};
+}
+
+static void follow(twin_rotating_t *r, twin_dq_t to, double psi_magnet)
+{
+    const twin_dq_t change = {to.d - r->psi.d, to.q - r->psi.q};
+    const double at_once = psi_magnet * (r->behind ? 1.0 / 16.0 : 0.75);
+    double share = 1.0;
+    if (fmax(fabs(change.d), fabs(change.q)) > at_once) {
+        share = r->behind ? 0.75 : 0.5;
+    }
+    r->behind = share < 1.0;
+    r->psi = sum(r->psi, share, change);
+}
+
+twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref, double omega, double psi_delta,
+                                  twin_rotating_t *rotating)
 {
     const twin_flux_t at = twin_flux_table(motor, i_ref);
     const double less = 1.0 - motor->setpoint_weight;
@@ -47,10 +65,12 @@ twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref, doub
     const double per_sigma = 1.0 / motor->sigma_rad_s;
     const double d = at.psi_d - less * at.l_d * i_ref.d;
     const double q = at.psi_q - less * at.l_q * i_ref.q;
+    follow(rotating, (twin_dq_t){d, q}, at.psi_d - at.l_d * i_ref.d);
+    const twin_dq_t r = rotating->psi;
     return (twin_target_t){
         .psi = {at.psi_d, at.psi_q},
-        .weighted = {d + drop * i_ref.d - per_sigma * rest * q,
-                     q + drop * i_ref.q + per_sigma * (rest * d + omega * psi_delta)},
+        .weighted = {d + drop * i_ref.d - per_sigma * rest * r.q,
+                     q + drop * i_ref.q + per_sigma * (rest * r.d + omega * psi_delta)},
         .turn = measured_share * omega,
         .integral_turn = motor->integral_ratio * rest,
     };
@@ -77,11 +97,6 @@ void twin_turning_reset(twin_turning_state_t *state, const twin_flux_t *flux)
 {
     const twin_dq_t psi = {flux->psi_d, flux->psi_q};
     *state = (twin_turning_state_t){.now = psi, .next = psi};
-}
-
-static twin_dq_t sum(twin_dq_t a, double factor, twin_dq_t b)
-{
-    return (twin_dq_t){a.d + factor * b.d, a.q + factor * b.q};
 }
 
 /* x e^(j angle). */

@@ -95,7 +95,14 @@ typedef struct {
     double omega, v_dc;
 } twin_current_in_t;
 
-twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref, double omega, double psi_delta);
+/* r: flux whose rotational voltage the target makes. Before the first target it is the measured flux. */
+typedef struct {
+    twin_dq_t psi;
+    bool behind;
+} twin_rotating_t;
+
+twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref, double omega, double psi_delta,
+                                  twin_rotating_t *rotating);
 
 twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *state, const twin_current_in_t *in);
 

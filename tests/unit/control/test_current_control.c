@@ -74,7 +74,8 @@ static dq_q15_halfword_t halfwords(dq_q15_t x)
 static current_target_t target_at(dq_q15_t i, const flux_point_t *at, int omega, int psi_delta)
 {
     const operating_point_t point = {.i = i, .flux = *at, .omega = (q31_t)((uint32_t)omega << 16)};
-    return current_control_target(&f.current_control, &point, psi_delta);
+    rotating_flux_t reached = {.psi = {(q15_t)at->psi_d, (q15_t)at->psi_q}};
+    return current_control_target(&f.current_control, &point, psi_delta, &reached);
 }
 
 static twin_dq_t si_psi(dq_q15_t psi)
@@ -117,8 +118,11 @@ void test_the_target_of_every_reference_follows_the_twin(void)
             const q15_t w = (q15_t)random_in(&seed, -32767, 32767);
             const q15_t delta = (q15_t)random_in(&seed, -3000, 3000);
             const current_target_t y = target_at(i, &at, w, delta * 32 / 21);
-            const twin_target_t t = twin_current_target(&f.si, (twin_dq_t){from_q15(d) * f.i, from_q15(q) * f.i},
-                                                        from_q15(w) * f.w, from_q15(delta) * f.psi);
+            const twin_dq_t si = {from_q15(d) * f.i, from_q15(q) * f.i};
+            const twin_flux_t table = twin_flux_table(&f.si, si);
+            twin_rotating_t reached = {.psi = {table.psi_d, table.psi_q}};
+            const twin_target_t t = twin_current_target(&f.si, si, from_q15(w) * f.w, from_q15(delta) * f.psi,
+                                                        &reached);
             const double lsb = 32768.0 / f.psi;
             worst_note(&worst, y.psi.d - t.psi.d * lsb, "psi_d of %d %d", d, q);
             worst_note(&worst, y.psi.q - twin_clamp(t.psi.q * lsb, -32768, 32767), "psi_q of %d %d", d, q);
@@ -185,6 +189,66 @@ void test_the_target_contains_what_the_measured_flux_does_not_make_of_the_rotati
                                sign * 0.5 * 21.0 / 32.0 * 32768.0 / 0.8488 * from_q15(f.current_control.integral_gain),
                                y.integral_turn);
     }
+}
+
+/* By hand: of a change of 15000, more than 3/4 of the magnet's 16000, one half is made, then 3/4 of the rest each time
+ * until 1/16 of the magnet's flux is left. f_d is 16000 - 0.5 * 21/32 r_q/0.8488. */
+void test_a_large_change_of_the_target_is_followed_as_the_machines_flux_follows_it(void)
+{
+    static const int32_t expected[] = {7500, 13125, 14531, 15000, 15000};
+    f.current_control.setpoint_weight = INT16_MAX;
+    f.current_control.drop_gain = 0;
+    const operating_point_t to = {.flux = {.psi_d = 16000, .psi_q = 15000, .psi_f0 = 16000}, .omega = 1 << 30};
+    for (int d = 0; d <= 1; d++) { /* either axis may be what is large */
+        rotating_flux_t rotating = {.psi = {(q15_t)(d ? 1000 : 16000), (q15_t)(d ? 15000 : 0)}};
+        for (unsigned k = 0; k < sizeof expected / sizeof *expected; k++) {
+            const current_target_t y = current_control_target(&f.current_control, &to, 0, &rotating);
+            const int32_t made = d ? rotating.psi.d - 1000 : rotating.psi.q;
+            TEST_ASSERT_INT_WITHIN(1, expected[k], made);
+            TEST_ASSERT_EQUAL(k < 3, rotating.behind);
+            TEST_ASSERT_EQUAL_INT(15000, y.psi.q);
+            TEST_ASSERT_INT_WITHIN(2, 16000 - 0.5 * 21.0 / 32.0 * rotating.psi.q / 0.8488, y.weighted.d / 32768);
+            TEST_ASSERT_INT_WITHIN(2, 15000 + 0.5 * 21.0 / 32.0 * rotating.psi.d / 0.8488, y.weighted.q / 32768);
+        }
+    }
+}
+
+void test_a_small_change_of_the_target_is_made_at_once(void)
+{
+    operating_point_t to = {.flux = {.psi_d = 16000, .psi_f0 = 16000}};
+    f.current_control.setpoint_weight = INT16_MAX;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        rotating_flux_t rotating = {.psi = {16000, 0}};
+        to.flux.psi_q = sign * 12000; /* 3/4 of the magnet's flux */
+        (void)current_control_target(&f.current_control, &to, 0, &rotating);
+        TEST_ASSERT_FALSE(rotating.behind);
+        TEST_ASSERT_INT_WITHIN(1, sign * 12000, rotating.psi.q);
+    }
+}
+
+/* Jumps between points whose flux the tables hold, up to the limit of current. */
+void test_the_followed_flux_is_that_of_the_twin(void)
+{
+    uint64_t seed = 58;
+    rotating_flux_t rotating = {.psi = {f.flux_table.psi_f0[0], 0}};
+    twin_rotating_t twin = {.psi = {from_q15(rotating.psi.d) * f.psi, 0.0}};
+    dq_q15_t i = {0, 0};
+    int behind = 0;
+    for (int n = 0; n < 20000; n++) {
+        if (random_in(&seed, 0, 3) == 0) {
+            i = (dq_q15_t){random_in(&seed, -20000, 0), random_in(&seed, -10000, 10000)};
+        }
+        const operating_point_t to = {.i = i, .flux = flux_table_step(&f.flux_table, i)};
+        (void)current_control_target(&f.current_control, &to, 0, &rotating);
+        (void)twin_current_target(&f.si, (twin_dq_t){from_q15(i.d) * f.i, from_q15(i.q) * f.i}, 0.0, 0.0, &twin);
+        behind += rotating.behind ? 1 : 0;
+        if (rotating.behind != twin.behind) { /* a bound lies within the error of the tables */
+            twin = (twin_rotating_t){si_psi(words(rotating.psi)), rotating.behind};
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(6.0, twin.psi.d / f.psi * 32768.0, rotating.psi.d);
+        TEST_ASSERT_DOUBLE_WITHIN(6.0, twin.psi.q / f.psi * 32768.0, rotating.psi.q);
+    }
+    TEST_ASSERT_GREATER_THAN_INT(2000, behind);
 }
 
 /* current_control_turning.h has a rotational voltage of its own. */
