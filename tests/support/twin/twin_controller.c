@@ -102,6 +102,14 @@ static double slew_now(const twin_t *twin)
     return weak ? fmin(slew_max, m->torque_slew_weak_Nm) : slew_max;
 }
 
+/* Of the last step; the paper's identification takes no sums. */
+static twin_dq_t mean_voltage(const twin_t *twin)
+{
+    const twin_window_t *w = &twin->complete;
+    const double n = twin->motor.periods_per_step;
+    return (twin->robust && w->acting) ? (twin_dq_t){w->sum_u.d / n, w->sum_u.q / n} : twin->sample.u;
+}
+
 static void torque_path(twin_t *twin)
 {
     twin->torque_commanded = slew(twin->torque_commanded, limited_torque(twin), slew_now(twin));
@@ -113,7 +121,7 @@ static void torque_path(twin_t *twin)
         .limited = voltage_limited(twin) || twin->reference.limited,
     };
     const twin_reserve_in_t reserve = {
-        .u = twin->sample.u,
+        .u = mean_voltage(twin),
         .psi = twin->psi_ref,
         .v_dc = twin->v_dc,
         .psi_plan = twin->reference.psi_plan,
