@@ -78,6 +78,12 @@ static bool update_means(const launch_power_config_t *config, launch_power_state
     return true;
 }
 
+/* What noise may change m - m_0 by: of both means together, as variances add up. 2 sqrt(2) in Q7; halves, which are q15. */
+static int32_t noise_of_change(const launch_power_state_t *state)
+{
+    return (362 * fx_magnitude(state->noise_q8 >> 9, state->first_noise_q8 >> 9)) >> 7;
+}
+
 /* (MN-29) */
 static bool is_wrong(const launch_power_config_t *config, const launch_power_state_t *state,
                      const launch_power_in_t *in)
@@ -85,8 +91,7 @@ static bool is_wrong(const launch_power_config_t *config, const launch_power_sta
     const q15_t current = fx_magnitude(in->i_ref.d, in->i_ref.q);
     const int32_t omega = fx_abs_q31(state->omega_q8 - state->first_omega_q8) >> 8;
     const int32_t psi = config->psi_share + (fx_abs_q15(in->psi_ref.q) >> 3);
-    const int32_t noise = fx_max_s32(state->noise_q8, state->first_noise_q8) >> 8;
-    const int32_t loss_max = fx_max_s32(times(config->v_1, current), 2 * noise);
+    const int32_t loss_max = fx_max_s32(times(config->v_1, current), noise_of_change(state));
     const int32_t change = (state->power_q8 - state->first_power_q8) >> 8;
     return current > config->i_min && fx_abs_q31(change) > loss_max + times(2 * times(omega, psi), current);
 }

@@ -331,7 +331,7 @@ static double twin_step(twin_t *t)
     follow(&t->p, &t->p_0, p, t->steady);
     follow(&t->w, &t->w_0, w, t->steady);
     const double v_turning = 2.0 * fabs(t->w - t->w_0) * (2884.0 + abs(in.psi_ref.q) / 8.0) / 65536.0;
-    const double loss_max = fmax(530.0 * hypot(i_d, i_q) / 65536.0, 2.0 * fmax(t->r, t->r_0));
+    const double loss_max = fmax(530.0 * hypot(i_d, i_q) / 65536.0, sqrt(2.0) * hypot(t->r, t->r_0));
     const double beyond = fabs(t->p - t->p_0) - loss_max - v_turning * hypot(i_d, i_q) / 65536.0;
     if (t->steady < SETTLED) {
         t->steady++;
