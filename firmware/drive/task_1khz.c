@@ -4,6 +4,7 @@
 #include "drive/mrai/mrai_seam.h"
 #include "drive/safe_decision.h"
 #include "drive/slow_monitors.h"
+#include "drive/step_mean.h"
 #include "drive/switch_off.h"
 #include "drive/tracked_speed.h"
 #include "fx/vec.h"
@@ -36,24 +37,12 @@ static run_state_t next_run_state(drive_t *drive, const snapshot_t *snapshot)
     return (enable && may_run) ? RUN_STATE_RUN : RUN_STATE_OFF;
 }
 
-/* Of the last step: single samples are at the same angles wherever the field turns by whole half turns in a step, and
- * there the harmonics of the dead time look like a constant. The paper's identification takes no sums. */
-static dq_q15_t mean_voltage(const drive_t *drive, const snapshot_t *snapshot)
-{
-    if (mrai_is_chosen(drive) || !snapshot->window.acting) {
-        return snapshot->sample.point.u;
-    }
-    const int32_t half_gain_q32 = drive->motor->identify.mean_gain_q32;
-    return (dq_q15_t){fx_mulhi(2 * snapshot->window.sum_u.d, half_gain_q32),
-                      fx_mulhi(2 * snapshot->window.sum_u.q, half_gain_q32)};
-}
-
 /* Compares the acting voltage with the plan of the last step. */
 static voltage_reserve_t update_voltage_reserve(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
     const voltage_reserve_in_t in = {
-        .u = mean_voltage(drive, snapshot),
+        .u = step_mean_voltage(drive, snapshot),
         .v_dc = (q15_t)snapshot->sample.v_dc,
         .psi = task->psi_ref,
         .psi_plan = task->reference.psi_plan,

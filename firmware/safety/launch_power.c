@@ -95,7 +95,7 @@ static bool update_means(const launch_power_config_t *config, launch_power_state
     return true;
 }
 
-/* What noise may change m - m_0 by: of both means together, as variances add up. 2 sqrt(2) in Q7; halves, which are q15. */
+/* What noise may change m - m_0 by: the variances of both means add up. Halves, which are q15; 2 sqrt(2) in Q7. */
 static int32_t noise_of_change(const launch_power_state_t *state)
 {
     return (362 * fx_magnitude(state->noise_q8 >> 9, state->first_noise_q8 >> 9)) >> 7;
