@@ -61,7 +61,7 @@ acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
     sample->theta_e = angle.theta_e;
     /* In the usual route a repeated reading is noticed at the end of the period (publish_sample()). */
     const bool repeated = !settled && theta_m == tracker->theta_m;
-    if (angle.jumped | repeated) {
+    if (angle.jumped || repeated) {
         check_angle(drive, sample, angle.step, angle.jumped, repeated);
         return (acquired_t){angle.step, false};
     }
