@@ -6,6 +6,7 @@ from typing import Protocol
 
 from progress import until
 from selenium import webdriver
+from selenium.common.exceptions import NoSuchElementException, StaleElementReferenceException
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 
@@ -33,8 +34,15 @@ class Page:
         return self.find(name).text
 
     def until(self, true: Callable[[], bool], what: str) -> None:
-        """Wait for the condition in simulated time."""
-        until(true, self.server.now_s, TIME_OUT_S, what)
+        """Wait for the condition in simulated time. It is not true yet while the page that loads lacks an element."""
+
+        def so_far() -> bool:
+            try:
+                return true()
+            except (NoSuchElementException, StaleElementReferenceException):
+                return False
+
+        until(so_far, self.server.now_s, TIME_OUT_S, what)
 
     def run(self, script: str, *arguments: object) -> object:
         return self.browser.execute_script(script, *arguments)

@@ -93,11 +93,11 @@ PLANTED: dict[str, tuple[Check, PlantedError]] = {
     ),
     "the parity is not checked": (
         a_disturbed_frame_is_an_invalid_sample,
-        PlantedError(PORT, "as5047_is_valid(frame), 1)", "(frame & AS5047_ERROR) == 0U, 1)"),
+        PlantedError(PORT, "as5047_is_valid(frame)) {", "(frame & AS5047_ERROR) == 0U) {"),
     ),
     "the error flag is not checked": (
         a_disturbed_frame_is_an_invalid_sample,
-        PlantedError(PORT, "as5047_is_valid(frame), 1)", "as5047_is_even(frame), 1)"),
+        PlantedError(PORT, "as5047_is_valid(frame)) {", "as5047_is_even(frame)) {"),
     ),
     "the encoder's state is not asked at the start": (
         a_start_without_an_encoder_is_refused,
