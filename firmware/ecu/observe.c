@@ -26,10 +26,6 @@ static const struct {
     {DERATING_SPEED, DERATING_REASON_SPEED},
 };
 
-#define DERATING_WITH_REASON                                                                                         \
-    (DERATING_INVERTER | DERATING_WINDING | DERATING_SENSOR | DERATING_DC_LOW | DERATING_DC_HIGH | DERATING_POWER | \
-     DERATING_MAGNET | DERATING_SPEED)
-
 void ecu_watch(ecu_t *ecu)
 {
     liveness_t *liveness = &ecu->liveness;
@@ -102,9 +98,6 @@ static uint32_t derating_reason(const ecu_t *ecu)
 {
     if (are_limits_lost(ecu)) {
         return DERATING_REASON_BATTERY_LIMITS_LOST;
-    }
-    if ((ecu->drive.task.derating & DERATING_WITH_REASON) == 0U) {
-        return DERATING_REASON_NONE; /* the usual case, twice in a step */
     }
     for (unsigned n = 0; n < sizeof reasons / sizeof reasons[0]; n++) {
         if ((ecu->drive.task.derating & reasons[n].derating) != 0U) {
