@@ -8,10 +8,14 @@ from __future__ import annotations
 
 import shlex
 import subprocess
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fluxtrue_tools.emulate.build import ROOT
+import pytest
+
+from fluxtrue_tools.emulate.build import ROOT, Parts
+from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.target import image
 
 PORT = ROOT / "hal" / "s32k144"
@@ -85,3 +89,10 @@ def with_error(error: PlantedError, folder: Path) -> dict[Path, Path]:
 def image_with_error(built: Path, error: PlantedError, folder: Path) -> Path:
     """The image `built` with the planted error, sealed."""
     return relinked(built, with_error(error, folder), folder)
+
+
+def assert_found(check: Callable[[Parts], None], parts: Parts, error: PlantedError, folder: Path) -> None:
+    """The check, which `parts` passes, fails on the image with the planted error."""
+    planted = replace(parts, image=image_with_error(parts.image, error, folder))
+    with pytest.raises((AssertionError, FluxtrueError)):
+        check(planted)

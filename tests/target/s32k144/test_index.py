@@ -6,21 +6,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 from listener import Listener
 from mover import Mover
-from planting import FIRMWARE, PlantedError, image_with_error
+from planting import FIRMWARE, PlantedError, assert_found
 from rotor_frame import error_A
 
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.bench.image import V_DC, Stand
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.build import Parts
-from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.library import Loop
 
 RAD_S = 0.10471975511965977
@@ -225,9 +224,7 @@ def test_the_encoder_image_passes_each_check(encoder: Parts, check: Check) -> No
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_planted_error_of_the_index_is_found(encoder: Parts, name: str, tmp_path: Path) -> None:
     check, error = PLANTED[name]
-    planted = replace(encoder, image=image_with_error(encoder.image, error, tmp_path))
-    with pytest.raises((AssertionError, FluxtrueError)):
-        check(planted)
+    assert_found(check, encoder, error, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -242,9 +239,7 @@ def test_the_flashed_encoder_image_passes_each_check(flashed: Parts, check: Chec
 @pytest.mark.parametrize("name", MOVEMENT)
 def test_a_planted_error_of_the_movement_is_found(flashed: Parts, name: str, tmp_path: Path) -> None:
     check, error = MOVEMENT[name]
-    planted = replace(flashed, image=image_with_error(flashed.image, error, tmp_path))
-    with pytest.raises((AssertionError, FluxtrueError)):
-        check(planted)
+    assert_found(check, flashed, error, tmp_path)
 
 
 def test_the_bus_names_the_reason(flashed: Parts) -> None:

@@ -7,20 +7,18 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from random import Random
 
 import flash_saves as flash
 import pytest
 import resets
-from planting import PlantedError, image_with_error
+from planting import PlantedError, assert_found
 
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.build import Parts
 from fluxtrue_tools.emulate.core import CENTRE, LIMIT, Core
-from fluxtrue_tools.errors import FluxtrueError
 
 POINTS = 10
 WITHOUT_GATES_MS = 2.0
@@ -233,6 +231,4 @@ PLANTED_ERRORS: dict[str, tuple[Callable[[Parts], None], PlantedError]] = {
 @pytest.mark.parametrize("name", PLANTED_ERRORS)
 def test_a_planted_error_is_found(parts: Parts, name: str, tmp_path: Path) -> None:
     check, error = PLANTED_ERRORS[name]
-    planted = replace(parts, image=image_with_error(parts.image, error, tmp_path))
-    with pytest.raises((AssertionError, FluxtrueError)):
-        check(planted)
+    assert_found(check, parts, error, tmp_path)
