@@ -43,9 +43,8 @@ def measure(raws: Sequence[Raw]) -> Balance:
     matrix = np.column_stack((i_s.real, i_s.imag, np.ones(len(i_s))))
     x, *_ = np.linalg.lstsq(matrix, zero, rcond=None)
     left = zero - matrix @ x
-    covariance = np.linalg.inv(matrix.T @ matrix) * float(left @ left) / (len(zero) - len(x))
+    variance = float(left @ left) / (len(zero) - len(x))
+    covariance = np.linalg.inv(matrix.T @ matrix) * variance
     worst = float(np.sqrt(np.linalg.eigvalsh(covariance[:2, :2]).max()))
-    noise_A = math.sqrt(
-        2.0 * float(left @ left) / (len(zero) - len(x))
-    )  # of the mean of three: a third of the variance
+    noise_A = math.sqrt(2.0 * variance)  # zero is a mean of three: it has half of the variance of a component
     return Balance(complex(x[0], x[1]), 2.0 * worst, noise_A)

@@ -90,6 +90,7 @@ class _Fit:
         self.magnet = self.basis.rows(zero, zero, 1, 0)
         self.zero = self.basis.rows(zero, zero, 0, 0)
         self.others = 2 + 2 * len(raws)
+        self.rows = [self._rows(n) for n in range(len(raws))]
 
     def _energy(self, burst: Linkage) -> sparse.csr_matrix:
         """The slopes of the energy, without the magnet's flux at the start."""
@@ -109,7 +110,7 @@ class _Fit:
         columns[:, first + 1] = _parts(1j * burst.turned) * START_PRIOR * self.scale
         return -columns / self.scale
 
-    def rows(self, n: int) -> Array:
+    def _rows(self, n: int) -> Array:
         """All unknowns of a burst's equations, per unit of scale."""
         return np.hstack((self._energy(self.bursts[n]).toarray(), self._errors(n)))
 
@@ -144,7 +145,7 @@ class _Fit:
         count = self.basis.count
         system = System(count + self.others)
         for n, noise in enumerate(noises):
-            system.add(noise.whitened(self.rows(n)), noise.whitened(self.values(n)[:, None])[:, 0])
+            system.add(noise.whitened(self.rows[n]), noise.whitened(self.values(n)[:, None])[:, 0])
         psi_f, error = magnet[0] / self.scale, magnet[0] * magnet[1] / self.scale
         for row, value in ((self.magnet, psi_f), (self.zero, 0.0)):
             known = sparse.hstack((row, sparse.csr_matrix((1, self.others))), format="csr") / error
@@ -177,7 +178,7 @@ def _surface(work: _Fit, x: Array, unknowns: float) -> Surface:
     left, psi = [], []
     model, count = work.energy(x), work.basis.count
     for n, burst in enumerate(work.bursts):
-        rest = (work.values(n) - work.rows(n) @ x) * work.scale
+        rest = (work.values(n) - work.rows[n] @ x) * work.scale
         half = len(burst.i)
         left.append(rest[:half] + 1j * rest[half:])
         psi.append(model.psi_d(burst.i.real, burst.i.imag) + 1j * model.psi_q(burst.i.real, burst.i.imag) + left[-1])
