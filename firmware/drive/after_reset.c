@@ -7,7 +7,7 @@ void before_reset(const drive_t *drive, before_reset_t *before)
     *before = (before_reset_t){
         .speed = drive->task.safe_state.speed,
         .v_dc = (q15_t)sample_box_last(&drive->samples)->v_dc,
-        .psi_delta = drive->psi_d_error,
+        .psi_d_error = drive->psi_d_error,
         .armed = drive->task.armed && (faults & FAULT_CONFIG) == 0U,
         .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
     };
@@ -25,7 +25,7 @@ static bool decide(const motor_t *m, safe_state_state_t *state, const before_res
 {
     const safe_state_in_t in = {
         .omega = present_speed(before, speed),
-        .psi_delta = before->psi_delta,
+        .psi_d_error = before->psi_d_error,
         .v_dc = (q15_t)fx_min_s32(v_dc, before->v_dc),
         .speed_valid = true,
     };

@@ -17,7 +17,7 @@
 typedef struct {
     q15_t speed; /* known (SS-5) */
     q15_t v_dc;
-    q15_t psi_delta;
+    q15_t psi_d_error;
     bool armed; /* the short circuit was permitted, and the motor data valid */
     bool speed_valid;
 } before_reset_t;

@@ -300,7 +300,7 @@ void drive_identify(drive_t *drive, const snapshot_t *snapshot);
 void drive_commission(drive_t *drive, const snapshot_t *snapshot);
 /** The voltage pulses' share of the 1 kHz task. */
 void drive_pulse(drive_t *drive, const snapshot_t *snapshot);
-static inline bool drive_pulses(const drive_t *drive)
+static inline bool drive_is_pulsing(const drive_t *drive)
 {
     return drive->task.pulsing.phase == PULSES_PULSE;
 }
@@ -310,7 +310,7 @@ void drive_move(drive_t *drive, const snapshot_t *snapshot);
  * Returns the advance per period. Fast ISR, outside the usual route. */
 int32_t drive_take_frame(drive_t *drive, const command_t *command, sample_t *sample, int32_t own_step);
 /** The currents of a movement act. */
-static inline bool drive_moves(const drive_t *drive)
+static inline bool drive_is_moving(const drive_t *drive)
 {
     return movement_moves(&drive->task.movement);
 }
@@ -359,7 +359,7 @@ static inline void drive_move_angle(drive_t *drive, uint32_t by)
 /** Current references come from outside the torque path. */
 static inline bool drive_bypasses_torque_path(const drive_t *drive)
 {
-    return drive->request.current_mode || commission_runs(&drive->task.commission) || drive_moves(drive);
+    return drive->request.current_mode || commission_runs(&drive->task.commission) || drive_is_moving(drive);
 }
 
 void fast_isr(drive_t *drive);

@@ -56,8 +56,8 @@ static void apply_safe_state(drive_t *drive, sample_t *sample, const command_t *
 }
 
 /* The voltage circle or a pulse limit is active: the voltage of the next period follows from the duties. */
-static inline FX_INLINED void voltage_by(drive_t *drive, sample_t *sample, const modulate_config_t *config,
-                                         modulate_out_t made, fx_pair_t i, fx_pair_t advanced)
+static inline FX_INLINED void recompute_voltage(drive_t *drive, sample_t *sample, const modulate_config_t *config,
+                                                modulate_out_t made, fx_pair_t i, fx_pair_t advanced)
 {
     if (made.limited != 0U) {
         sample->pulses_clamped = true;
@@ -69,7 +69,7 @@ static inline FX_INLINED void voltage_by(drive_t *drive, sample_t *sample, const
 static FX_NOT_INLINED FX_INLINES_CALLS void voltage_from_duties(drive_t *drive, sample_t *sample, modulate_out_t made,
                                                                 fx_pair_t i, fx_pair_t advanced)
 {
-    voltage_by(drive, sample, &drive->parameters.modulate, made, i, advanced);
+    recompute_voltage(drive, sample, &drive->parameters.modulate, made, i, advanced);
 }
 
 /* The duties of the first period act in the second; the third sample ends a period whose duties are known. */
@@ -125,7 +125,7 @@ static inline FX_INLINED void write_duties(drive_t *drive, sample_t *sample, con
         if ((made.limited | wanted.limited) != 0U) {
             sample->voltage_limited = wanted.limited != 0U;
             if (turning != NULL) {
-                voltage_by(drive, sample, turning, made, now->i_dq, now->advanced);
+                recompute_voltage(drive, sample, turning, made, now->i_dq, now->advanced);
             } else {
                 voltage_from_duties(drive, sample, made, now->i_dq, now->advanced);
             }

@@ -25,7 +25,7 @@ static identification_t robust_identification(const drive_t *drive, const identi
         .r_delta = fx_add_q31(state->kept.r_prior - config->r0, identify_value(config, state, IDENTIFY_R)),
         .lq_error = acts ? identify_value(config, state, IDENTIFY_LQ) : 0,
         .torque_variance_q30 = state->torque_variance_q30,
-        .psi_d_error = acts ? (q15_t)out->psi_delta : (q15_t)0,
+        .psi_d_error = acts ? (q15_t)out->psi_d_error : (q15_t)0,
         .torque_estimated = (q15_t)out->torque,
         .confidence = acts ? state->kept.confidence : (q15_t)0,
         .psi_quality = variance_reduction(state, IDENTIFY_FLUX),

@@ -8,15 +8,15 @@
 #define SWING_STEPS 10U             /* over which the damping compares the rotor's speed */
 #define WEAK_SHARE Q15(0.2)         /* of the current, while the rotor becomes faster */
 
-movement_turn_t movement_frame_step(const movement_frame_t *frame, movement_angle_t *angle,
-                                    const movement_sensor_t *sensor)
+movement_frame_motion_t movement_frame_step(const movement_frame_t *frame, movement_angle_t *angle,
+                                            const movement_sensor_t *sensor)
 {
     angle->omega_sensor = sensor->omega;
     if (frame->pole_pairs == 0) {
         angle->imposed += (uint32_t)frame->rate;
-        return (movement_turn_t){angle->imposed, frame->rate, 0}; /* the back-EMF of 1 Hz is negligible */
+        return (movement_frame_motion_t){angle->imposed, frame->rate, 0}; /* the back-EMF of 1 Hz is negligible */
     }
-    return (movement_turn_t){
+    return (movement_frame_motion_t){
         .theta_e = (uint32_t)frame->pole_pairs * sensor->theta_m + frame->offset,
         .step = (int32_t)(((int64_t)sensor->step * frame->ratio_q25) >> 25),
         .omega = fx_sat_q31(((int64_t)sensor->omega * frame->ratio_q25) >> 25),

@@ -108,7 +108,7 @@ typedef struct {
     uint32_t theta_e;
     int32_t step;
     q31_t omega;
-} movement_turn_t;
+} movement_frame_motion_t;
 
 typedef struct {
     movement_phase_t phase;
@@ -131,8 +131,8 @@ typedef struct {
     q31_t omega; /* of the sensor */
 } movement_in_t;
 
-movement_turn_t movement_frame_step(const movement_frame_t *frame, movement_angle_t *angle,
-                                    const movement_sensor_t *sensor);
+movement_frame_motion_t movement_frame_step(const movement_frame_t *frame, movement_angle_t *angle,
+                                            const movement_sensor_t *sensor);
 
 /** Begins, continues or ends the requested movement, and computes the frame and state->i_ref. */
 void movement_step(const movement_config_t *config, uint32_t pole_pairs, movement_state_t *state,

@@ -5,7 +5,7 @@
 /* With MOVEMENT_CONNECTED alone a small torque may brake the rotor; the second level does not check it meanwhile. */
 static bool has_request(const drive_t *drive)
 {
-    const int32_t largest = drive_moves(drive) ? 0 : drive->motor->torque_max / 8;
+    const int32_t largest = drive_is_moving(drive) ? 0 : drive->motor->torque_max / 8;
     return fx_abs_q31(drive->request.torque_arbitrated) > largest;
 }
 
@@ -29,9 +29,9 @@ uint8_t drive_bridge_mode(const drive_t *drive, bool runs)
         return (uint8_t)BRIDGE_OFF;
     }
     if (movement_is_agreed(&drive->task.movement)) {
-        return drive_pulses(drive) ? (uint8_t)BRIDGE_MOVED_PULSES : (uint8_t)BRIDGE_MOVED;
+        return drive_is_pulsing(drive) ? (uint8_t)BRIDGE_MOVED_PULSES : (uint8_t)BRIDGE_MOVED;
     }
-    return drive_pulses(drive) ? (uint8_t)BRIDGE_PULSES : (uint8_t)BRIDGE_CONTROL;
+    return drive_is_pulsing(drive) ? (uint8_t)BRIDGE_PULSES : (uint8_t)BRIDGE_CONTROL;
 }
 
 /* Nothing is identified, because the angle is not that of the motor data. */
@@ -41,9 +41,9 @@ int32_t drive_take_frame(drive_t *drive, const command_t *command, sample_t *sam
         return own_step;
     }
     const movement_sensor_t sensor = {sample->theta_m, own_step, sample->point.omega};
-    const movement_turn_t turn = movement_frame_step(&drive->frame, &drive->frame_angle, &sensor);
-    sample->theta_e = turn.theta_e;
-    sample->point.omega = turn.omega;
+    const movement_frame_motion_t motion = movement_frame_step(&drive->frame, &drive->frame_angle, &sensor);
+    sample->theta_e = motion.theta_e;
+    sample->point.omega = motion.omega;
     identify_window_invalidate(&drive->fast.window);
-    return turn.step;
+    return motion.step;
 }

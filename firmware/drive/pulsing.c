@@ -27,7 +27,7 @@ static bool has_no_request(const request_t *request)
 static bool may_start(const drive_t *drive, const snapshot_t *snapshot)
 {
     return drive->task.run_state == RUN_STATE_RUN && !mrai_is_chosen(drive) &&
-           !commission_runs(&drive->task.commission) && !drive_moves(drive) && has_no_request(&drive->request) &&
+           !commission_runs(&drive->task.commission) && !drive_is_moving(drive) && has_no_request(&drive->request) &&
            fx_abs_q31(snapshot->sample.point.omega) <= drive->motor->commission.omega_max;
 }
 
@@ -43,7 +43,7 @@ static void start_or_refuse(drive_t *drive, const snapshot_t *snapshot)
     pulsing_t *pulsing = &drive->task.pulsing;
     const pulses_config_t *wanted = &drive->request.pulses.config;
     pulsing->starts = drive->request.pulses.starts;
-    if (drive_pulses(drive)) {
+    if (drive_is_pulsing(drive)) {
         return; /* the pulses continue */
     }
     if (!may_start(drive, snapshot) || !is_in_range(drive, wanted)) {
@@ -72,7 +72,7 @@ void drive_pulse(drive_t *drive, const snapshot_t *snapshot)
         start_or_refuse(drive, snapshot);
         return;
     }
-    if (!drive_pulses(drive)) {
+    if (!drive_is_pulsing(drive)) {
         return;
     }
     if (drive->task.run_state != RUN_STATE_RUN || !has_no_request(&drive->request)) {

@@ -49,7 +49,7 @@ void recall_step(drive_t *drive, q31_t omega)
         count_update(drive, recall, omega);
     }
     const bool rejected = recall->trials >= RECALL_TRIALS ||
-                          drive->task.identify.contradicted_updates >= RECALL_CONTRADICTED;
+                          drive->task.identify.gate_exceeded_updates >= RECALL_GATE_EXCEEDED;
     if (recall->agreed >= RECALL_AGREED) {
         recall->unconfirmed = false;
     } else if (rejected) {

@@ -6,8 +6,8 @@
  *   confirmed  in RECALL_AGREED updates in a row the residuals of both axes are those of a flux error of at most a
  *              quarter of noise_flux, |e| <= |w| noise_flux/4, at torque_min (identify/config.h) or more
  *   rejected   if RECALL_TRIALS updates at half of the local corner's speed or more have not confirmed them, or after
- *              RECALL_CONTRADICTED updates in a row beyond the innovation gate, which is before (MN-12) reports a wrong
- *              angle: the identification restarts from its priors
+ *              RECALL_GATE_EXCEEDED updates in a row beyond the innovation gate, which is before (MN-12) reports a
+ *              wrong angle: the identification restarts from its priors
  * Source   docs/theory/identification.md (ID-22)
  * Units    residuals per unit of voltage, Q30
  * Range    every speed and residual
@@ -17,7 +17,7 @@
 
 #define RECALL_AGREED 3U
 #define RECALL_TRIALS 50U
-#define RECALL_CONTRADICTED 3U
+#define RECALL_GATE_EXCEEDED 3U
 
 /** The recalled values have to be confirmed from now on. */
 void recall_begin(drive_t *drive);

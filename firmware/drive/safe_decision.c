@@ -77,7 +77,7 @@ safe_t safe_decision_step(drive_t *drive, const snapshot_t *snapshot)
     const gate_fault_in_t gate = gate_fault_inputs(drive, snapshot);
     const safe_state_in_t in = {
         .omega = fx_q15_from_q31(point->omega),
-        .psi_delta = snapshot->psi_d_error,
+        .psi_d_error = snapshot->psi_d_error,
         .v_dc = (q15_t)snapshot->sample.v_dc,
         .i = point->i,
         .i_last_period = snapshot->i_last_period,

@@ -23,9 +23,9 @@ static dq_q15_t mean_current(const drive_t *drive, const snapshot_t *snapshot)
                       fx_mulhi(2 * snapshot->window.sum_i.q, half_gain_q32)};
 }
 
-static uint8_t contradicted_steps(const drive_t *drive)
+static uint8_t gate_exceeded_steps(const drive_t *drive)
 {
-    return mrai_is_chosen(drive) ? 0U : (uint8_t)(IDENTIFY_STEPS * drive->task.identify.contradicted_updates);
+    return mrai_is_chosen(drive) ? 0U : (uint8_t)(IDENTIFY_STEPS * drive->task.identify.gate_exceeded_updates);
 }
 
 /* A rotor that stands induces nothing, and a bridge that does not switch makes no voltage. */
@@ -54,7 +54,7 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q
         .inverter_dC = snapshot->inverter_dC,
         .winding_dC = snapshot->winding_dC,
         .known_permille = snapshot->known_permille,
-        .contradicted_steps = contradicted_steps(drive),
+        .gate_exceeded_steps = gate_exceeded_steps(drive),
     };
     return plausibility_step(config, &task->plausibility, &in);
 }
@@ -99,7 +99,7 @@ static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot, abc_q15_
         .u_sum = window->sum_u,
         .i_ref = task->i_ref,
         .psi_ref = task->psi_ref,
-        .i_least = least_of(phases_ref),
+        .i_phase_min = least_of(phases_ref),
         .theta_e = snapshot->sample.theta_e,
     };
     return frozen_angle_step(&drive->motor->frozen_angle, &task->frozen_angle, &in);
@@ -189,7 +189,7 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
     const bool acting = !is_compensation_new(drive) && is_window_new &&
                         !is_fast(turns_of_step_q60(drive, snapshot->sample.point.omega));
     const uint32_t of_currents = check_currents(drive, snapshot, phases_ref);
-    if (drive_moves(drive)) { /* with the angle of a movement, comparisons with the motor data have no meaning */
+    if (drive_is_moving(drive)) { /* with the angle of a movement, comparisons with the motor data have no meaning */
         return (of_currents & (FAULT_TEMPERATURE | FAULT_OVER_SPEED | FAULT_INPUT | FAULT_CURRENT_STUCK)) | shorted;
     }
     const bool behind = torque_monitor_is_behind(&drive->motor->torque_monitor, snapshot->lag, drive->task.psi_ref);

@@ -19,7 +19,7 @@ static inline void slow_monitors_without_machine(motor_t *m)
     m->plausibility.ripple_max = Q15_MAX;
     m->plausibility.zero_error_max = Q15_MAX;
     m->gate_fault.i_alive = Q15_MAX;
-    m->plausibility.contradicted_steps = UINT8_MAX;
+    m->plausibility.gate_exceeded_steps = UINT8_MAX;
     m->torque_monitor.v_0 = Q15_MAX;
     m->frozen_angle.v_0 = Q15_MAX;
     m->launch_power.i_min = Q15_MAX;

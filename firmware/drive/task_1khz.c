@@ -51,7 +51,7 @@ static voltage_reserve_t update_voltage_reserve(drive_t *drive, const snapshot_t
         .v_dc = (q15_t)snapshot->sample.v_dc,
         .psi = task->psi_ref,
         .psi_plan = task->reference.psi_plan,
-        .psi_delta = snapshot->psi_d_error,
+        .psi_d_error = snapshot->psi_d_error,
         .acting = snapshot->sample.acting && !drive_bypasses_torque_path(drive),
     };
     return voltage_reserve_step(&drive->motor->voltage_reserve, &task->voltage_reserve, &in);
@@ -129,7 +129,7 @@ static dq_q15_t compute_references(drive_t *drive, const snapshot_t *snapshot)
         .i_magnitude = fx_magnitude(task->reference.i_ref.d, task->reference.i_ref.q),
         .v_trim = trim.v_trim,
         .shift = trim.shift,
-        .psi_delta = snapshot->psi_d_error,
+        .psi_d_error = snapshot->psi_d_error,
         .i_d_max = i_d_limit_step(&drive->motor->i_d_limit, snapshot->psi_d_error, snapshot->winding_dC),
         .psi_q_delta = psi_q_delta(drive),
     };
@@ -137,7 +137,7 @@ static dq_q15_t compute_references(drive_t *drive, const snapshot_t *snapshot)
     if (commission_runs(&task->commission)) {
         return task->commission.i_ref;
     }
-    if (drive_moves(drive)) {
+    if (drive_is_moving(drive)) {
         return task->movement.i_ref;
     }
     return drive->request.current_mode ? drive->request.i_ref : task->reference.i_ref;

@@ -36,6 +36,8 @@ typedef int32_t q16_t;
 #define Q31(x) ((q31_t)FX_CONST((double)(x), 2147483648.0, -2147483648.0, 2147483647.0))
 #define Q16(x) ((q16_t)FX_CONST((double)(x), 65536.0, -2147483648.0, 2147483647.0))
 
+#define SQRT3_HALF 0.86602540378443865 /* sqrt(3)/2, for Q15(), Q16() and Q31() */
+
 __attribute__((always_inline)) static inline q15_t fx_sat_q15(int32_t x)
 {
     return fx_arch_ssat16(x);

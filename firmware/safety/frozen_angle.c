@@ -66,7 +66,7 @@ static bool has_changed(const frozen_angle_config_t *config, const frozen_angle_
     }
     const q15_t d = fx_sat_q15((state->mean_q8.d - state->first_q8.d) >> 8);
     const q15_t q = fx_sat_q15((state->mean_q8.q - state->first_q8.q) >> 8);
-    return fx_magnitude(d, q) > ((in->i_least > i_held) ? config->v_0 : UNCERTAIN * config->v_0);
+    return fx_magnitude(d, q) > ((in->i_phase_min > i_held) ? config->v_0 : UNCERTAIN * config->v_0);
 }
 
 uint32_t frozen_angle_step(const frozen_angle_config_t *config, frozen_angle_state_t *state,

@@ -38,11 +38,11 @@ typedef struct {
 
 typedef struct {
     bool acting;
-    bool behind;      /* the tracked speed is behind the rotor's: the comparison begins anew */
-    dq_q15_t u_sum;   /* acting voltage, summed over the periods of a step */
-    dq_q15_t i_ref;   /* in effect during that step */
-    dq_q15_t psi_ref; /* tables' flux there */
-    q15_t i_least;    /* the smallest of its phase currents, magnitude */
+    bool behind;       /* the tracked speed is behind the rotor's: the comparison begins anew */
+    dq_q15_t u_sum;    /* acting voltage, summed over the periods of a step */
+    dq_q15_t i_ref;    /* in effect during that step */
+    dq_q15_t psi_ref;  /* tables' flux there */
+    q15_t i_phase_min; /* the smallest of its phase currents, magnitude */
     uint32_t theta_e;
 } frozen_angle_in_t;
 

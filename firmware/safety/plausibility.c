@@ -142,7 +142,7 @@ uint32_t plausibility_step(const plausibility_config_t *config, plausibility_sta
         };
         return faults;
     }
-    faults |= (in->contradicted_steps >= config->contradicted_steps) ? FAULT_TORQUE : 0U;
+    faults |= (in->gate_exceeded_steps >= config->gate_exceeded_steps) ? FAULT_TORQUE : 0U;
     state->expected = plausibility_expected(config, state, in->i_ref);
     return faults | deviation(config, state, in) | oscillation(config, state, in) | stuck_sensors(config, state, in) |
            lost_phases(config, state, in);

@@ -34,8 +34,8 @@ typedef struct {
     q15_t answer_rate;    /* share of a change of the reference that the current follows in a step; Q15_MAX: all */
     q15_t omega_trip;
     int16_t inverter_trip_dC, winding_trip_dC;
-    int16_t deviation_steps;    /* 100 ms: a step counts once while the voltage is limited, else five times */
-    uint8_t contradicted_steps; /* 70 ms */
+    int16_t deviation_steps;     /* 100 ms: a step counts once while the voltage is limited, else five times */
+    uint8_t gate_exceeded_steps; /* 70 ms */
     uint8_t ripple_steps, lost_steps, equal_steps, fast_steps, hot_steps; /* 20, 8, 20, 5, 110 ms */
 } plausibility_config_t;
 
@@ -61,8 +61,8 @@ typedef struct {
     abc_q15_t phases_ref; /* plausibility_expected() as phase currents at the instant of the samples */
     q15_t omega;
     int16_t inverter_dC, winding_dC;
-    int16_t known_permille;     /* of a known voltage, as the converters read it; negative: there is none */
-    uint8_t contradicted_steps; /* in a row, as the identification reports them */
+    int16_t known_permille;      /* of a known voltage, as the converters read it; negative: there is none */
+    uint8_t gate_exceeded_steps; /* in a row, as the identification reports them */
 } plausibility_in_t;
 
 /** The reference as the current follows it in this step. Where the field turns far in a period, current control answers

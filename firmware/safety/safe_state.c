@@ -3,7 +3,6 @@
 
 #include "signal/debounce.h"
 
-#define SQRT3 113512            /* Q15.16 */
 #define FALL_PER_STEP Q15(0.004) /* of the speed base: from there to standstill in 250 steps */
 #define CONFIRMED_STEPS 20
 #define FALL_SHIFT 6 /* of the known dc voltage: 64 steps */
@@ -79,8 +78,8 @@ bool safe_state_step(const safe_state_config_t *config, safe_state_state_t *stat
 {
     follow_speed(config, state, in);
     follow_voltage(state, in);
-    const q15_t psi = fx_sat_q15(config->psi_f + fx_max_s32(in->psi_delta, 0));
-    state->line_emf = fx_mul_gain_q15(SQRT3, fx_mul_q15(state->speed, psi));
+    const q15_t psi = fx_sat_q15(config->psi_f + fx_max_s32(in->psi_d_error, 0));
+    state->line_emf = fx_mul_gain_q15(Q16(2.0 * SQRT3_HALF), fx_mul_q15(state->speed, psi));
     const bool lower_level = state->short_circuit || !in->speed_valid;
     const q15_t share = lower_level ? config->share_open : config->share_short;
     const bool rectifies = state->line_emf > fx_mul_q15(share, state->v_dc);

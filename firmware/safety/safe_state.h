@@ -48,7 +48,7 @@ typedef struct {
 
 typedef struct {
     q15_t omega;
-    q15_t psi_delta; /* identified flux minus the table's */
+    q15_t psi_d_error; /* identified flux minus the table's */
     q15_t v_dc;
     dq_q15_t i, i_last_period; /* measured in this period and in the one before it */
     dq_q15_t psi_current;      /* tables' flux at i, less that at no current */

@@ -118,7 +118,7 @@ static void record(capture_t *capture, int16_t *memory, const capture_source_t *
 }
 
 /* The ring no longer contains the next period: the capture ends early, or the search begins again. */
-static void lose(capture_t *capture, uint32_t newest)
+static void skip_lost_periods(capture_t *capture, uint32_t newest)
 {
     capture->lost++;
     if (capture->state == CAPTURE_ARMED) {
@@ -136,7 +136,7 @@ void capture_step(capture_t *capture, int16_t *memory, const capture_source_t *s
     while ((capture->state == CAPTURE_ARMED || capture->state == CAPTURE_TRIGGERED) &&
            (int32_t)(source->newest - capture->next) >= 0) {
         if (source->newest - capture->next >= USABLE) {
-            lose(capture, source->newest);
+            skip_lost_periods(capture, source->newest);
         } else {
             record(capture, memory, source);
         }

@@ -108,7 +108,7 @@ void second_level_frame(second_level_frames_t *frames, const can_frame_t *frame)
 }
 
 /* True while the channel has timed out. */
-static bool grow_old(second_level_channel_t *channel, uint32_t elapsed_us, uint32_t time_out_us)
+static bool has_timed_out(second_level_channel_t *channel, uint32_t elapsed_us, uint32_t time_out_us)
 {
     if (channel->alive) {
         channel->age_us += elapsed_us;
@@ -122,10 +122,10 @@ static bool grow_old(second_level_channel_t *channel, uint32_t elapsed_us, uint3
 
 void second_level_frames_tick(second_level_frames_t *frames, uint32_t elapsed_us)
 {
-    if (grow_old(&frames->command, elapsed_us, COMMAND_TIME_OUT_US)) {
+    if (has_timed_out(&frames->command, elapsed_us, COMMAND_TIME_OUT_US)) {
         frames->torque_counts = 0;
     }
-    if (grow_old(&frames->battery, elapsed_us, BATTERY_TIME_OUT_US)) {
+    if (has_timed_out(&frames->battery, elapsed_us, BATTERY_TIME_OUT_US)) {
         frames->power_drive_counts = 0;
         frames->power_regen_counts = 0;
     }

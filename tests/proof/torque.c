@@ -103,9 +103,9 @@ void proof_torque_inside_both_limits(void)
 void proof_i_d_limit(void)
 {
     i_d_limit_config_t c;
-    q15_t psi_delta;
+    q15_t psi_d_error;
     int16_t winding_dC;
     ASSUME(WITHIN(c.i_20, 0, 1 << 20) && c.slope >= 0 && c.slope <= (1 << 24) && c.i_max >= 0);
-    const q15_t i_d_max = i_d_limit_step(&c, psi_delta, winding_dC);
+    const q15_t i_d_max = i_d_limit_step(&c, psi_d_error, winding_dC);
     PROVE(i_d_max >= 0 && i_d_max <= c.i_max);
 }

@@ -246,5 +246,5 @@ def test_the_monitors_of_the_machine_are_all_enabled_again(make: Callable[[], Dr
     assert drive.set("machine_monitors", 1.0) == OK
     layout = members(drive.library._name)
     for name in ("plausibility.e_0", "plausibility.i_alive", "plausibility.ripple_max", "torque_monitor.v_0",
-                 "plausibility.contradicted_steps", "gate_fault.i_alive", "frozen_angle.v_0"):  # fmt: skip
+                 "plausibility.gate_exceeded_steps", "gate_fault.i_alive", "frozen_angle.v_0"):  # fmt: skip
         assert layout.read(drive.handle, f"motor.{name}") == layout.read(new.handle, f"motor.{name}"), name

@@ -99,8 +99,8 @@ FX_COLD angle_t angle_tracker_coast(const angle_tracker_config_t *config, angle_
 
 /* Whether the sensor has failed or the rotor stands. A reading that repeats for longer than the sensor's resolution
  * explains (AT-16) is a sensor failure, unless the rotor lagged behind the prediction before: then it stops (AT-17). */
-static angle_repeats_t whose_repeats(const angle_tracker_config_t *config, const angle_tracker_state_t *state,
-                                     const angle_t *angle)
+static repeat_cause_t cause_of_repeats(const angle_tracker_config_t *config, const angle_tracker_state_t *state,
+                                       const angle_t *angle)
 {
     const int32_t repeats = (int32_t)state->repeats;
     if (!angle->jumped && (int64_t)fx_abs_q31(angle->step) * repeats <= config->repeat_max) {
@@ -122,17 +122,17 @@ FX_COLD angle_repeat_t angle_tracker_repeated(const angle_tracker_config_t *conf
     const bool in_a_row = period - state->repeat_period == 1U;
     state->repeats = in_a_row ? state->repeats + (state->repeats < UINT16_MAX ? 1U : 0U) : 1U;
     state->repeat_period = period;
-    state->whose = in_a_row ? state->whose : REPEATS_UNDECIDED;
-    if (state->whose == REPEATS_UNDECIDED) {
-        state->whose = whose_repeats(config, state, angle);
+    state->cause = in_a_row ? state->cause : REPEATS_UNDECIDED;
+    if (state->cause == REPEATS_UNDECIDED) {
+        state->cause = cause_of_repeats(config, state, angle);
     }
-    if (state->whose != REPEATS_OF_SENSOR) {
+    if (state->cause != REPEATS_OF_SENSOR) {
         return ANGLE_FOLLOWED;
     }
     if (state->repeats <= config->stop_periods || !angle_tracker_may_stop(state)) {
         return ANGLE_STUCK;
     }
-    state->whose = REPEATS_OF_ROTOR; /* (AT-18) */
+    state->cause = REPEATS_OF_ROTOR; /* (AT-18) */
     state->omega_q30 = 0;
     state->predicted = angle->theta_e;
     *angle = result(angle->theta_e, 0, 0, false);

@@ -33,7 +33,7 @@ typedef struct {
 } angle_tracker_config_t;
 
 /** What repeated readings of an angle show: not decided yet, a failed sensor, or a rotor at standstill. */
-typedef enum { REPEATS_UNDECIDED, REPEATS_OF_SENSOR, REPEATS_OF_ROTOR } angle_repeats_t;
+typedef enum { REPEATS_UNDECIDED, REPEATS_OF_SENSOR, REPEATS_OF_ROTOR } repeat_cause_t;
 
 typedef struct {
     uint32_t predicted; /* tracked electrical angle of the coming sample */
@@ -42,7 +42,7 @@ typedef struct {
     uint32_t repeat_period; /* number of the last period in which it was repeated */
     uint32_t repeats;       /* in a row; saturates */
     uint8_t samples;        /* taken so far, up to 2: the first two set angle and speed directly */
-    angle_repeats_t whose;  /* decided once in a row */
+    repeat_cause_t cause;   /* decided once in a row */
 } angle_tracker_state_t;
 
 typedef struct {

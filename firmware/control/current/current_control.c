@@ -96,7 +96,7 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     const current_control_state_t s = {integrators.first, integrators.second};
     const int32_t error_d = to.psi.d - psi.d;
     const int32_t omega = fx_in_register(in->omega >> 16);
-    const int32_t psi_d = fx_sat_q15_word(psi.d + in->psi_delta);
+    const int32_t psi_d = fx_sat_q15_word(psi.d + in->psi_d_error);
     /* |s| <= 1 and |w psi| <= 1: at most 2^31 - 1. */
     const dq_q22_t u_q22 = {unlimited_voltage(config->sigma_q24, to.weighted.d, psi.d, s.s_d_q30 - omega * psi.q),
                             unlimited_voltage(config->sigma_q24, to.weighted.q, psi.q, s.s_q_q30 + omega * psi_d)};

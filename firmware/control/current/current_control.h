@@ -54,7 +54,7 @@ typedef struct {
     const current_target_t *target;
     const flux_point_t *flux; /* at the measured current */
     q31_t omega;              /* only its upper half is used; the integrators supply the remaining feed-forward */
-    q15_t psi_delta;          /* identified flux minus the table's */
+    q15_t psi_d_error;        /* identified flux minus the table's */
     int32_t v_dc;             /* q15, not negative */
 } current_control_in_t;
 

@@ -51,7 +51,7 @@ current_control_out_t turning_control_step(const turning_control_config_t *confi
 {
     const current_control_in_t *control = &in->control;
     const uint32_t half = (uint32_t)(in->angle_step >> 1);
-    const int32_t magnet = control->psi_delta * Q29_PER_Q15;
+    const int32_t psi_d_error = control->psi_d_error * Q29_PER_Q15;
     const dq_q29_t none = {0, 0};
     const dq_q29_t e = {state->now.d - control->flux->psi_d * Q29_PER_Q15,
                         state->now.q - control->flux->psi_q * Q29_PER_Q15};
@@ -60,7 +60,7 @@ current_control_out_t turning_control_step(const turning_control_config_t *confi
                           approach(config, begin.q, control->target->psi.q)};
     state->now = begin;
     dq_q28_t model, back, rotational;
-    across(&(dq_q29_t){end.d + magnet, end.q}, &(dq_q29_t){begin.d + magnet, begin.q}, half, &model);
+    across(&(dq_q29_t){end.d + psi_d_error, end.q}, &(dq_q29_t){begin.d + psi_d_error, begin.q}, half, &model);
     across(&e, &none, 0U - 3U * half, &back);
     across(&e, &e, half, &rotational);
     const dq_q30_t u = {voltage(config, &state->s.d, model.d, back.d, rotational.d, in->i.d),

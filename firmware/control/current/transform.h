@@ -15,8 +15,6 @@
 #include "fx/trig.h"
 #include "types/frames.h"
 
-#define SQRT3_HALF 0.86602540378443865 /* for Q15(), Q16() and Q31() */
-
 /* Q30 to Q15, half up. */
 static inline int32_t transform_round(int32_t q30)
 {

@@ -8,7 +8,7 @@
 #define PER_STEP 429496730 /* 2^32/IDENTIFY_STEPS */
 #define REFERENCE_dC 200   /* 20 C */
 #define MISMATCH_MAX Q15(0.5)
-#define CONTRADICTED_MAX 25 /* ten times as many steps fit into a byte */
+#define GATE_EXCEEDED_MAX 25 /* ten times as many steps fit into a byte */
 
 typedef struct {
     identify_flux_t at; /* identified */
@@ -76,8 +76,8 @@ static void update_parameters(const identify_config_t *config, identify_state_t 
     const uint32_t d = kalman_update(kalman, &mean->d, mean->e.d, mean->noise_q30);
     const int32_t change = fx_sub_q31(kalman_output(kalman, &mean->q), output_before);
     const uint32_t both = d | kalman_update(kalman, &mean->q, fx_sub_q31(mean->e.q, change), mean->noise_q30);
-    const uint32_t contradicted = count_up_to(state->contradicted_updates, CONTRADICTED_MAX);
-    state->contradicted_updates = ((d & KALMAN_GATE_EXCEEDED) != 0U) ? (uint8_t)contradicted : 0U;
+    const uint32_t exceeded = count_up_to(state->gate_exceeded_updates, GATE_EXCEEDED_MAX);
+    state->gate_exceeded_updates = ((d & KALMAN_GATE_EXCEEDED) != 0U) ? (uint8_t)exceeded : 0U;
     state->kept.clamped = (both & KALMAN_CLAMPED) != 0U;
     const int32_t error = fx_sat_q15_word(((both != 0U) ? Q15_MAX : 0) - state->kept.mismatch_share);
     state->kept.mismatch_share = fx_add_q15(state->kept.mismatch_share, fx_mul_q15(config->mismatch_rate, error));
@@ -113,7 +113,7 @@ static void kalman_step(const identify_config_t *config, identify_state_t *state
     if (state->kept.update_valid) {
         update_parameters(config, state);
     } else {
-        state->contradicted_updates = 0;
+        state->gate_exceeded_updates = 0;
     }
     kalman_predict(config, &state->kalman, state->kept.r_known);
     identify_seal_parameters(state);

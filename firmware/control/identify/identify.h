@@ -35,8 +35,8 @@ _Static_assert(sizeof(identify_kept_t) == 20U, "no bytes between the fields");
 
 typedef struct {
     uint8_t steps;
-    uint8_t contradicted_updates; /* in a row, up to 25: the d axis exceeds the innovation gate (MN-12) */
-    bool damaged;                 /* a seal did not match: the memory has changed what only this stage writes */
+    uint8_t gate_exceeded_updates; /* in a row, up to 25: the d axis exceeds the innovation gate (MN-12) */
+    bool damaged;                  /* a seal did not match: the memory has changed what only this stage writes */
     identify_kept_t kept;
     uint32_t seal;               /* of kept */
     int32_t torque_variance_q30; /* at the last update */
@@ -53,8 +53,8 @@ typedef struct {
 } identify_in_t;
 
 typedef struct {
-    int32_t torque;    /* q15: air gap, mean over the window */
-    int32_t psi_delta; /* q15: identified minus table's flux in the d axis, here */
+    int32_t torque;      /* q15: air gap, mean over the window */
+    int32_t psi_d_error; /* q15: identified minus table's flux in the d axis, here */
 } identify_out_t;
 
 /* Check the two seals: of what is kept from step to step, and of the parameters with their covariance. */

@@ -69,7 +69,7 @@ static q15_t torque_max_identified(const current_reference_config_t *config, con
     const int32_t psi = fx_sat_q15_word(planned + fx_min_s32(in->shift, 0));
     const int32_t torque_max = torque_max_from_table(config, psi);
     const dq_q15_t i = currents_from_table(config, torque_max, psi);
-    const int32_t identified = fx_mul_q15(in->psi_delta, i.q) - fx_mul_q15(in->psi_q_delta, i.d);
+    const int32_t identified = fx_mul_q15(in->psi_d_error, i.q) - fx_mul_q15(in->psi_q_delta, i.d);
     return (q15_t)fx_usat_q15_word(torque_max + identified);
 }
 

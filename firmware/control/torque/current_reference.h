@@ -40,7 +40,7 @@ typedef struct {
     int32_t i_magnitude; /* |i_ref| of the last step: the resistive drop */
     int32_t v_trim;
     int32_t shift;
-    int32_t psi_delta;   /* identified flux minus the table's, d axis */
+    int32_t psi_d_error; /* identified flux minus the table's, d axis */
     int32_t i_d_max;     /* magnitude of the demagnetisation limit at the present temperature */
     int32_t psi_q_delta; /* identified |psi_q| minus the tables', at the last reference */
 } current_reference_in_t;

@@ -24,11 +24,11 @@ typedef struct {
     int16_t assumed_dC;
 } i_d_limit_config_t;
 
-static inline q15_t i_d_limit_step(const i_d_limit_config_t *config, q15_t psi_delta, int16_t winding_dC)
+static inline q15_t i_d_limit_step(const i_d_limit_config_t *config, q15_t psi_d_error, int16_t winding_dC)
 {
     int32_t dC = config->assumed_dC;
     if (temperature_is_known(winding_dC)) {
-        const int32_t magnet = 200 + fx_mul_gain_q15(config->dC_per_psi, psi_delta);
+        const int32_t magnet = 200 + fx_mul_gain_q15(config->dC_per_psi, psi_d_error);
         dC = fx_max_s32(winding_dC, fx_min_s32(magnet, config->assumed_dC));
     }
     const int32_t reduction = fx_mulhi(config->slope, fx_sat_q15(dC - 200) * 65536);

@@ -34,10 +34,10 @@ typedef struct {
 typedef struct {
     dq_q15_t u; /* acting voltage */
     int32_t v_dc;
-    dq_q15_t psi;      /* tables' flux at the last reference */
-    int32_t psi_plan;  /* of the last reference */
-    int32_t psi_delta; /* identified flux minus the table's */
-    bool acting;       /* the bridge makes u */
+    dq_q15_t psi;        /* tables' flux at the last reference */
+    int32_t psi_plan;    /* of the last reference */
+    int32_t psi_d_error; /* identified flux minus the table's */
+    bool acting;         /* the bridge makes u */
 } voltage_reserve_in_t;
 
 typedef struct {

@@ -77,7 +77,7 @@ def test_debouncing_counts_cover_their_times_and_no_step_more(generated, pwm_hz,
     """The times in ms are those of docs/theory/monitors.md and commissioning.md."""
     c, _, motor = generated(pwm_hz)
     times_ms = {"deviation": 100, "lost": 8, "ripple": 20, "equal": 20, "fast": 5, "hot": 110, "torque": 20,
-                "angle": 5, "settle": 5, "contradicted": 70, "measure": 64, "trim": 1000}  # fmt: skip
+                "angle": 5, "settle": 5, "gate_exceeded": 70, "measure": 64, "trim": 1000}  # fmt: skip
     for name, ms in times_ms.items():
         count = int(c[f"{name}_steps"])
         assert ms - 1e-3 <= 1e3 * count * step_s < ms + 1e3 * step_s, name

@@ -72,7 +72,7 @@ static twin_dq_t twin_step(twin_current_state_t *twin)
     const twin_current_in_t t = {{si_psi(target.psi), si_psi(weighted)},
                                  &si,
                                  from_q31(in.omega) * f.w,
-                                 from_q15(in.psi_delta) * f.psi,
+                                 from_q15(in.psi_d_error) * f.psi,
                                  from_q15(in.v_dc) * f.v};
     const twin_dq_t u = twin_current_control(&f.si, twin, &t);
     return (twin_dq_t){u.d / f.v * 32768.0, u.q / f.v * 32768.0};
@@ -157,7 +157,7 @@ void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
         flux.psi_q = psi.q;
         target = (current_target_t){random_dq(&seed, largest), q30(random_dq(&seed, largest))};
         in.omega = random_in(&seed, -32767, 32767) * 65536;
-        in.psi_delta = (q15_t)random_in(&seed, -3000, 3000);
+        in.psi_d_error = (q15_t)random_in(&seed, -3000, 3000);
         in.v_dc = (q15_t)random_in(&seed, 900, 32767);
         state = (current_control_state_t){random_in(&seed, -450000000, 450000000),
                                           random_in(&seed, -450000000, 450000000)};
@@ -237,7 +237,7 @@ void test_at_standstill_without_error_the_voltage_is_that_of_the_integrators(voi
 void test_the_rotational_voltages_are_fed_forward_with_the_identified_flux(void)
 {
     in.omega = 16384 * 65536;
-    in.psi_delta = 1000;
+    in.psi_d_error = 1000;
     in.v_dc = 32767;
     flux.psi_d = target.psi.d = 10000;
     flux.psi_q = target.psi.q = 6000;
@@ -357,7 +357,7 @@ void test_from_every_flux_at_the_voltage_limit_the_target_is_reached(void)
         target.psi = (dq_q15_t){(q15_t)lround(magnet.psi_d / f.psi * 32768.0), 0};
         target.weighted = q30(target.psi);
         in.omega = (q31_t)lround(w / f.w * 2147483648.0);
-        in.psi_delta = 0;
+        in.psi_d_error = 0;
         for (int k = 0; k < 400; k++) { /* 40 ms, one period of delay */
             flux.psi_d = (q15_t)lround(psi_d / f.psi * 32768.0);
             flux.psi_q = (q15_t)lround(psi_q / f.psi * 32768.0);
@@ -489,7 +489,7 @@ void test_the_worst_corner_of_every_input_neither_wraps_nor_leaves_the_circle(vo
         target.psi = (dq_q15_t){end[(n >> 2) & 1], end[(n >> 3) & 1]};
         target.weighted = q30((dq_q15_t){end[(n >> 4) & 1], end[(n >> 5) & 1]});
         in.omega = ((n >> 6) & 1) ? INT32_MIN : INT32_MAX;
-        in.psi_delta = end[(n >> 7) & 1];
+        in.psi_d_error = end[(n >> 7) & 1];
         state.s_d_q30 = state.s_q_q30 = (n & 256) ? -(1 << 30) : (1 << 30) - 1;
         in.v_dc = (n & 1) ? 32767 : 900;
         const dq_q15_t u = step(); /* at most |v_q| = 1 and the 0.7 that the d axis always keeps */

@@ -107,7 +107,7 @@ static double complex twin_step(twin_turning_state_t *twin, double theta)
     const twin_turning_in_t x = {{{{from_q15(target.psi.d), from_q15(target.psi.q)}, {0.0, 0.0}},
                                   &psi,
                                   theta / turn,
-                                  from_q15(in.control.psi_delta),
+                                  from_q15(in.control.psi_d_error),
                                   from_q15(in.control.v_dc)},
                                  {from_q15(in.i.d), from_q15(in.i.q)},
                                  theta};
@@ -129,7 +129,7 @@ static void randomise(uint64_t *seed, int32_t largest)
     flux = (flux_point_t){.psi_d = random_in(seed, -largest, largest), .psi_q = random_in(seed, -largest, largest)};
     target.psi = (dq_q15_t){random_in(seed, -largest, largest), random_in(seed, -largest, largest)};
     in.i = (dq_q15_t){random_in(seed, -20000, 20000), random_in(seed, -20000, 20000)};
-    in.control.psi_delta = (q15_t)random_in(seed, -3000, 3000);
+    in.control.psi_d_error = (q15_t)random_in(seed, -3000, 3000);
 }
 
 /* Near a boundary of the circle's 256 steps, stage and twin may use different ones. */
@@ -284,7 +284,7 @@ void test_extreme_inputs_stay_within_their_limits(void)
         flux = (flux_point_t){.psi_d = corner[random_in(&seed, 0, 2)], .psi_q = corner[random_in(&seed, 0, 2)]};
         target.psi = (dq_q15_t){corner[random_in(&seed, 0, 2)], corner[random_in(&seed, 0, 2)]};
         in.i = (dq_q15_t){corner[random_in(&seed, 0, 2)], corner[random_in(&seed, 0, 2)]};
-        in.control.psi_delta = (q15_t)corner[random_in(&seed, 0, 2)];
+        in.control.psi_d_error = (q15_t)corner[random_in(&seed, 0, 2)];
         in.control.v_dc = random_in(&seed, 0, 1) ? 32767 : random_in(&seed, 0, 2000);
         in.angle_step = (int32_t)random_u32(&seed);
         step();

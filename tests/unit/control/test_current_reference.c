@@ -141,9 +141,9 @@ void test_the_largest_torque_includes_the_identified_error_of_the_magnet_flux(vo
     in.omega = 26214;
     const q15_t nominal = step().torque_max;
     const double t = nominal / 32768.0;
-    in.psi_delta = -3277; /* -0.1 */
+    in.psi_d_error = -3277; /* -0.1 */
     TEST_ASSERT_DOUBLE_WITHIN(8.0, nominal - 3276.8 * (1.1 * t - 0.2 * t * t), step().torque_max);
-    in.psi_delta = INT16_MIN;
+    in.psi_d_error = INT16_MIN;
     TEST_ASSERT_GREATER_OR_EQUAL_INT(0, step().torque_max);
 }
 
@@ -206,7 +206,7 @@ void test_the_references_follow_the_twin_over_torque_speed_and_voltage(void)
         const twin_reference_in_t t = {
             from_q15(in.torque_corrected) * f.t, from_q15(in.v_dc) * f.v,    from_q15(in.omega) * f.w,
             from_q15(in.i_magnitude) * f.i,      from_q15(in.v_trim) * f.v,  from_q15(in.shift) * f.psi,
-            from_q15(in.psi_delta) * f.psi,      from_q15(in.i_d_max) * f.i, from_q15(in.psi_q_delta) * f.psi};
+            from_q15(in.psi_d_error) * f.psi,    from_q15(in.i_d_max) * f.i, from_q15(in.psi_q_delta) * f.psi};
         const current_reference_t y = step();
         const twin_reference_t s = twin_current_reference(&f.si, &t);
         worst_note(&worst, y.i_ref.d - s.i_ref.d / f.i * 32768, "i_d of T %d v %d w %d", in.torque_corrected, in.v_dc,

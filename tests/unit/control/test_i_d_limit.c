@@ -17,9 +17,9 @@ void tearDown(void)
 {
 }
 
-static q15_t limit(double psi_delta, int16_t winding_dC)
+static q15_t limit(double psi_d_error, int16_t winding_dC)
 {
-    return i_d_limit_step(&f.i_d_limit, (q15_t)lround(psi_delta * 32768.0), winding_dC);
+    return i_d_limit_step(&f.i_d_limit, (q15_t)lround(psi_d_error * 32768.0), winding_dC);
 }
 
 /* By hand: 0.9 at 20 C minus 0.002 per K, and at most 0.8, the current circle. */

@@ -332,20 +332,20 @@ void test_a_mismatch_in_either_axis_alone_removes_the_confidence(void)
             (void)identify_step(&c, &state, &in);
         }
         /* Only the gate of the d axis counts: a voltage along q may be caused by a changed magnet. */
-        TEST_ASSERT_EQUAL_UINT8((axis == 0) ? 25 : 0, state.contradicted_updates);
+        TEST_ASSERT_EQUAL_UINT8((axis == 0) ? 25 : 0, state.gate_exceeded_updates);
         TEST_ASSERT_GREATER_THAN_INT(16384, state.kept.mismatch_share);
         TEST_ASSERT_FALSE(state.kept.torque_certain);
     }
 }
 
-void test_the_count_of_contradicted_updates_is_cleared_by_a_good_update_and_without_one(void)
+void test_the_count_of_updates_beyond_the_gate_is_cleared_by_a_good_update_and_without_one(void)
 {
-    state.contradicted_updates = 7;
+    state.gate_exceeded_updates = 7;
     drive(nominal, 3);
-    TEST_ASSERT_EQUAL_UINT8(0, state.contradicted_updates);
-    state.contradicted_updates = 7;
+    TEST_ASSERT_EQUAL_UINT8(0, state.gate_exceeded_updates);
+    state.gate_exceeded_updates = 7;
     run((dq_q15_t){0, 0}, 0.5, nominal, 20); /* too little current for an update */
-    TEST_ASSERT_EQUAL_UINT8(0, state.contradicted_updates);
+    TEST_ASSERT_EQUAL_UINT8(0, state.gate_exceeded_updates);
 }
 
 /* The magnet is 7 standard deviations of its prior weaker than assumed. With so large a noise the innovation stays

@@ -104,9 +104,9 @@ void test_the_trim_follows_a_falling_dc_voltage_at_once(void)
 void test_the_shift_is_the_change_of_the_flux_magnitude_by_the_identified_error(void)
 {
     TEST_ASSERT_EQUAL_INT(0, step().shift);
-    in.psi_delta = 1000;
+    in.psi_d_error = 1000;
     TEST_ASSERT_INT_WITHIN(2, 817, step().shift);
-    in.psi_delta = -1000;
+    in.psi_d_error = -1000;
     TEST_ASSERT_INT_WITHIN(2, (int)(sqrt(49e6 + 36e6) - 10000), step().shift);
 }
 
@@ -120,7 +120,7 @@ void test_the_reserve_follows_the_twin(void)
         in.u = (dq_q15_t){random_in(&seed, -12000, 12000), random_in(&seed, -12000, 12000)};
         in.v_dc = (q15_t)random_in(&seed, 15000, 30000);
         in.psi = (dq_q15_t){random_in(&seed, 0, 20000), random_in(&seed, -20000, 20000)};
-        in.psi_delta = (q15_t)random_in(&seed, -4000, 2000);
+        in.psi_d_error = (q15_t)random_in(&seed, -4000, 2000);
         in.psi_plan = (q15_t)((n & 1) ? hypot(in.psi.d, in.psi.q) : 32767);
         in.acting = (n % 7) != 0;
         if (fabs(0.55 * in.v_dc - hypot(in.u.d, in.u.q)) < 4.0) {
@@ -131,7 +131,7 @@ void test_the_reserve_follows_the_twin(void)
             .psi = {in.psi.d / 32768.0 * f.psi, in.psi.q / 32768.0 * f.psi},
             .v_dc = in.v_dc / 32768.0 * f.v,
             .psi_plan = in.psi_plan / 32768.0 * f.psi,
-            .psi_delta = in.psi_delta / 32768.0 * f.psi,
+            .psi_delta = in.psi_d_error / 32768.0 * f.psi,
             .acting = in.acting,
         };
         const voltage_reserve_t y = step();

@@ -70,7 +70,7 @@ void test_what_is_kept_is_what_the_drive_knows(void)
     before_reset_t kept;
     before_reset(&drive, &kept);
     TEST_ASSERT_EQUAL_INT16(1234, kept.speed);
-    TEST_ASSERT_EQUAL_INT16(-5, kept.psi_delta);
+    TEST_ASSERT_EQUAL_INT16(-5, kept.psi_d_error);
     TEST_ASSERT_TRUE(kept.armed && kept.speed_valid);
     drive.fast.faults = FAULT_ANGLE;
     before_reset(&drive, &kept);

@@ -67,18 +67,18 @@ void test_the_frame_of_a_connection_is_that_of_the_sensor(void)
     request.offset = 0x0123;
     steps(1);
     const movement_sensor_t sensor = {.theta_m = 0x10000000U, .step = 4000, .omega = 400000};
-    movement_turn_t turn = movement_frame_step(&frame, &angle, &sensor);
-    TEST_ASSERT_EQUAL_HEX32(0x31230000U, turn.theta_e);
-    TEST_ASSERT_INT32_WITHIN(1, 3000, turn.step);
-    TEST_ASSERT_INT32_WITHIN(1, 300000, turn.omega);
+    movement_frame_motion_t motion = movement_frame_step(&frame, &angle, &sensor);
+    TEST_ASSERT_EQUAL_HEX32(0x31230000U, motion.theta_e);
+    TEST_ASSERT_INT32_WITHIN(1, 3000, motion.step);
+    TEST_ASSERT_INT32_WITHIN(1, 300000, motion.omega);
     TEST_ASSERT_EQUAL_INT32(400000, angle.omega_sensor);
     setUp();
     request.reversed = true;
     steps(1);
-    turn = movement_frame_step(&frame, &angle, &sensor);
-    TEST_ASSERT_EQUAL_HEX32(0xD0000000U, turn.theta_e);
-    TEST_ASSERT_INT32_WITHIN(1, -3000, turn.step);
-    TEST_ASSERT_INT32_WITHIN(1, -300000, turn.omega);
+    motion = movement_frame_step(&frame, &angle, &sensor);
+    TEST_ASSERT_EQUAL_HEX32(0xD0000000U, motion.theta_e);
+    TEST_ASSERT_INT32_WITHIN(1, -3000, motion.step);
+    TEST_ASSERT_INT32_WITHIN(1, -300000, motion.omega);
 }
 
 void test_a_speed_beyond_the_format_saturates(void)
@@ -102,10 +102,10 @@ void test_the_imposed_angle_turns_with_a_slope_in_both_directions(void)
     TEST_ASSERT_EQUAL_INT32(100, frame.rate);
     steps(9);
     TEST_ASSERT_EQUAL_INT32(400, frame.rate);
-    const movement_turn_t turn = movement_frame_step(&frame, &angle, &sensor);
-    TEST_ASSERT_EQUAL_HEX32(400, turn.theta_e);
-    TEST_ASSERT_EQUAL_INT32(400, turn.step);
-    TEST_ASSERT_EQUAL_INT32(0, turn.omega);
+    const movement_frame_motion_t motion = movement_frame_step(&frame, &angle, &sensor);
+    TEST_ASSERT_EQUAL_HEX32(400, motion.theta_e);
+    TEST_ASSERT_EQUAL_INT32(400, motion.step);
+    TEST_ASSERT_EQUAL_INT32(0, motion.omega);
     TEST_ASSERT_EQUAL_INT32(77, angle.omega_sensor);
     TEST_ASSERT_EQUAL_HEX32(800, movement_frame_step(&frame, &angle, &sensor).theta_e);
     request.direction = MOVEMENT_BACKWARD;

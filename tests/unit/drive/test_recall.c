@@ -108,13 +108,13 @@ void test_fifty_updates_with_a_residual_at_speed_reject_the_values_and_at_low_sp
     assert_rejected();
 }
 
-void test_three_contradicted_updates_reject_the_values_at_any_time(void)
+void test_three_updates_beyond_the_gate_reject_the_values_at_any_time(void)
 {
     state->steps = 0;
-    state->contradicted_updates = 2;
+    state->gate_exceeded_updates = 2;
     updates(1, FAST);
     assert_undecided();
-    state->contradicted_updates = 3;
+    state->gate_exceeded_updates = 3;
     updates(1, FAST);
     assert_rejected();
 }

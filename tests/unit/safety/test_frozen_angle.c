@@ -19,7 +19,7 @@ void setUp(void)
 {
     state = (frozen_angle_state_t){0};
     in = (frozen_angle_in_t){
-        .acting = true, .u_sum = {-3000, 2500}, .i_ref = {-9000, 12000}, .i_least = 4000, .theta_e = 0x30000000u};
+        .acting = true, .u_sum = {-3000, 2500}, .i_ref = {-9000, 12000}, .i_phase_min = 4000, .theta_e = 0x30000000u};
 }
 
 void tearDown(void)
@@ -199,12 +199,12 @@ void test_a_rotor_that_turns_while_the_reference_creeps_is_found(void)
 void test_a_leg_without_current_may_change_its_voltage(void)
 {
     settle();
-    in.i_least = 2 * 819;
+    in.i_phase_min = 2 * 819;
     in.u_sum.q += 8000;
     TEST_ASSERT_EQUAL_INT(0, found());
     setUp();
     settle();
-    in.i_least = 2 * 819;
+    in.i_phase_min = 2 * 819;
     in.u_sum.q += 9000;
     TEST_ASSERT_GREATER_THAN(0, found());
 }
@@ -358,7 +358,7 @@ static double mover_step(mover_t *t)
         t->standing++;
         return -100.0;
     }
-    return hypot(t->m[0] - t->first[0], t->m[1] - t->first[1]) - ((in.i_least > 1638) ? 1060.0 : 8480.0);
+    return hypot(t->m[0] - t->first[0], t->m[1] - t->first[1]) - ((in.i_phase_min > 1638) ? 1060.0 : 8480.0);
 }
 
 static int32_t uniform(int32_t lo, int32_t hi)
@@ -380,7 +380,7 @@ void test_means_and_decisions_are_those_of_the_twin(void)
         if (n % 60 == 0) {
             in.i_ref = (dq_q15_t){uniform(-20000, -4000), uniform(-20000, 20000)};
             in.theta_e = (uint32_t)uniform(-2000000000, 2000000000);
-            in.i_least = (q15_t)((n % 120 == 0) ? 1638 : 1639);
+            in.i_phase_min = (q15_t)((n % 120 == 0) ? 1638 : 1639);
             u = (dq_q15_t){uniform(-30000, 30000), uniform(-30000, 30000)};
         }
         in.theta_e += (n % 60 == 25) ? (uint32_t)turns[n / 60 % 4] : 0U;
@@ -412,7 +412,7 @@ void test_no_argument_wraps(void)
                                  .u_sum = {ends[n & 1U], ends[n >> 1 & 1U]},
                                  .i_ref = {i, -1 - i},
                                  .psi_ref = {psi, -1 - psi},
-                                 .i_least = INT16_MAX,
+                                 .i_phase_min = INT16_MAX,
                                  .theta_e = n << 28};
         (void)step();
         TEST_ASSERT_TRUE(abs(state.mean_q8.d) <= (40 + 3) * 32768 * 256);

@@ -17,7 +17,7 @@ static const plausibility_config_t config = {.answer_rate = Q15_MAX,
                                              .inverter_trip_dC = 1050,
                                              .winding_trip_dC = 1800,
                                              .deviation_steps = 100,
-                                             .contradicted_steps = 60,
+                                             .gate_exceeded_steps = 60,
                                              .ripple_steps = 20,
                                              .lost_steps = 10,
                                              .equal_steps = 20,
@@ -355,9 +355,9 @@ void test_equal_currents_at_standstill_are_not_stuck(void)
 
 void test_a_mismatch_of_60_steps_is_a_fault_of_the_torque(void)
 {
-    in.contradicted_steps = 59;
+    in.gate_exceeded_steps = 59;
     TEST_ASSERT_EQUAL_HEX32(0, run_one_turn(-1));
-    in.contradicted_steps = 60;
+    in.gate_exceeded_steps = 60;
     TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE, run_one_turn(-1));
     in.acting = false;
     TEST_ASSERT_EQUAL_HEX32(0, run_one_turn(-1));

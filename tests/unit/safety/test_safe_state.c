@@ -83,9 +83,9 @@ void test_between_the_thresholds_the_decision_stays(void)
 
 void test_a_stronger_identified_magnet_counts_and_a_weaker_one_does_not(void)
 {
-    in.psi_delta = 1311; /* 10 % stronger: short circuit above 0.7085 */
+    in.psi_d_error = 1311; /* 10 % stronger: short circuit above 0.7085 */
     TEST_ASSERT_TRUE(at(0.72));
-    in.psi_delta = -6000;
+    in.psi_d_error = -6000;
     TEST_ASSERT_FALSE(at(0.691));
     TEST_ASSERT_TRUE(at(0.781));
 }
@@ -415,7 +415,7 @@ void test_a_short_circuit_after_an_over_voltage_lasts_at_any_speed_until_the_vol
 void test_no_argument_wraps(void)
 {
     in.omega = INT16_MIN;
-    in.psi_delta = INT16_MAX;
+    in.psi_d_error = INT16_MAX;
     in.v_dc = INT16_MAX;
     TEST_ASSERT_TRUE(safe_state_step(&config, &state, &in));
 }

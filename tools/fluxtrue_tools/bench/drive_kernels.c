@@ -282,7 +282,7 @@ static inline __attribute__((always_inline)) void tick(drive_t *d, bool looks_up
         .target = found.target,
         .flux = looks_up ? &here : &flux,
         .omega = angle.omega_q31,
-        .psi_delta = d->psi_d_error,
+        .psi_d_error = d->psi_d_error,
         .v_dc = measured.v_dc,
     };
     const current_control_out_t wanted = current_control_step(&d->parameters.current_control, &d->fast.current_control,
@@ -347,7 +347,7 @@ STAGE void bench_current_control(void)
         .target = found.target,
         .flux = &flux,
         .omega = found.sample->omega,
-        .psi_delta = d->psi_d_error,
+        .psi_d_error = d->psi_d_error,
         .v_dc = sample_box_at(&d->samples, d->samples.generation)->v_dc,
     };
     found.wanted = current_control_step(&d->parameters.current_control, &d->fast.current_control, &control);

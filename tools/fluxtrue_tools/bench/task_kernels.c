@@ -121,7 +121,7 @@ CALLED void task_identify(void)
     };
     const identify_out_t out = identify_step(&d->motor->identify, &d->task.identify, &in);
     d->task.identification.torque_estimated = out.torque;
-    d->task.psi_d_error = out.psi_delta;
+    d->task.psi_d_error = out.psi_d_error;
 }
 
 CALLED void task_trim(void)
@@ -170,7 +170,7 @@ CALLED void task_reference(void)
         .v_dc = (q15_t)snapshot.sample.v_dc,
         .psi = d->task.psi_ref,
         .psi_plan = d->task.reference.psi_plan,
-        .psi_delta = snapshot.psi_d_error,
+        .psi_d_error = snapshot.psi_d_error,
         .acting = snapshot.sample.acting,
     };
     const voltage_reserve_t trim = voltage_reserve_step(&d->motor->voltage_reserve, &d->task.voltage_reserve, &voltage);
@@ -182,7 +182,7 @@ CALLED void task_reference(void)
         .i_magnitude = fx_magnitude((q15_t)i_ref.d, (q15_t)i_ref.q),
         .v_trim = trim.v_trim,
         .shift = trim.shift,
-        .psi_delta = snapshot.psi_d_error,
+        .psi_d_error = snapshot.psi_d_error,
         .i_d_max = i_d_limit_step(&d->motor->i_d_limit, snapshot.psi_d_error, snapshot.winding_dC),
         .psi_q_delta = 0,
     };
@@ -205,7 +205,7 @@ CALLED void task_safe_state(void)
     drive_t *d = the_copy();
     const safe_state_in_t in = {
         .omega = fx_q15_from_q31(snapshot.sample.point.omega),
-        .psi_delta = snapshot.psi_d_error,
+        .psi_d_error = snapshot.psi_d_error,
         .v_dc = (q15_t)snapshot.sample.v_dc,
         .speed_valid = true,
     };

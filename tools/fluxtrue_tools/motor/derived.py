@@ -64,7 +64,7 @@ LAUNCH_SHARE = 0.1  # of the inverter's voltage error: what a rotor's turning ma
 LAUNCH_SPARE = LAUNCH_SHARE - math.pi / 6.0 * (1.0 - math.cos(math.pi / 6.0))  # what (MN-33) leaves of it
 LAUNCH_ANGLE = 0.3 * 2.0 * math.pi / 4096  # of a turn of the rotor in a step: the resolution of a sensor of 12 bits
 LAUNCH_FLUX_SHARE = 0.2  # of psi_f: deviation of the magnet
-TORQUE_S, ANGLE_S, SETTLE_S, CONTRADICTED_S = 0.02, 0.005, 0.005, 0.07
+TORQUE_S, ANGLE_S, SETTLE_S, GATE_EXCEEDED_S = 0.02, 0.005, 0.005, 0.07
 TRIM_S = 1.0  # of identification between two moves of the dead-time compensation
 COMMISSION_SETTLE_S, COMMISSION_MEASURE_S = 0.04, 0.064
 # Of a movement of the shaft for commissioning: shares of i_max and of the largest speed.

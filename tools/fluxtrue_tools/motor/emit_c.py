@@ -15,10 +15,10 @@ from fluxtrue_tools.motor.derived import (
     ANGLE_S,
     COMMISSION_MEASURE_S,
     COMMISSION_SETTLE_S,
-    CONTRADICTED_S,
     DEVIATION_S,
     EQUAL_S,
     FAST_S,
+    GATE_EXCEEDED_S,
     HOT_S,
     LAG_SHARE,
     LAUNCH_ANGLE,
@@ -477,7 +477,7 @@ def _plausibility(motor: Motor) -> list[Row]:
             equal=EQUAL_S,
             fast=FAST_S,
             hot=HOT_S,
-            contradicted=CONTRADICTED_S,
+            gate_exceeded=GATE_EXCEEDED_S,
         ),
     ]
 
