@@ -44,7 +44,7 @@ progress_t drive_progress(drive_t *drive)
     const uint32_t periods = drive->samples.generation;
     const progress_t progress = {
         .periods = periods - drive->task.periods_seen,
-        .stalled = mrai_is_stalled(drive) || periods == drive->task.periods_seen,
+        .stalled = (mrai_is_chosen(drive) && mrai_is_stalled(drive)) || periods == drive->task.periods_seen,
     };
     drive->task.periods_seen = periods;
     return progress;

@@ -200,9 +200,9 @@ static void take_snapshot(const drive_t *drive, snapshot_t *snapshot)
         snapshot->sample = *sample_box_at(&drive->samples, generation);
         snapshot->i_last_period = sample_box_at(&drive->samples, generation - 1U)->point.i;
         snapshot->window = *window_box_at(&drive->windows);
-#if FLUXTRUE_MRAI
-        mrai_snapshot(drive, &snapshot->mrai);
-#endif
+        if (mrai_is_chosen(drive)) {
+            mrai_snapshot(drive, snapshot);
+        }
         snapshot->psi_d_error = drive->psi_d_error;
         snapshot->faults = drive->fast.faults;
         snapshot->shorted = drive_is_shorted(drive);

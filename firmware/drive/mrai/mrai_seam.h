@@ -3,8 +3,8 @@
 #define MRAI_MRAI_SEAM_H
 /** The interface of the 2014 paper's identification, an optional consumer of the operating point.
  *   The fast ISR calls mrai_offer() in a period in which the law is chosen; the 1 kHz task calls mrai_snapshot(),
- *   mrai_identify() and mrai_reschedule(); the second interrupt is mrai_isr() (drive/drive.h). While the law is not
- *   chosen, none of them runs.
+ *   mrai_identify(), mrai_reschedule() and mrai_is_stalled(); the second interrupt is mrai_isr() (drive/drive.h). While
+ *   the law is not chosen, none of them runs: only the comparison of mrai_had_one_of(), once per window.
  * Source   docs/architecture.md, shared data; docs/decisions/012-seam-of-the-papers-law.md
  * Units    as in control/mrai
  * Errors   a point that comes before the last one is finished is dropped and counted; three in a row are FAULT_OVERRUN
@@ -38,8 +38,8 @@ static inline bool mrai_had_one_of(const drive_t *drive, uint32_t generation, ui
     return generation - drive->mrai.mailbox.generation < periods;
 }
 
-/** 1 kHz task, as part of its snapshot. */
-void mrai_snapshot(const drive_t *drive, mrai_snapshot_t *snapshot);
+/** 1 kHz task: the law's part of the snapshot, which is undefined while the law is not chosen. */
+void mrai_snapshot(const drive_t *drive, snapshot_t *snapshot);
 /** 1 kHz task: the result of the law as the drive's identification. */
 void mrai_identify(drive_t *drive, const snapshot_t *snapshot);
 /** 1 kHz task, after the references: gains for this operating point and for the one just commanded. */
@@ -87,6 +87,12 @@ static inline bool mrai_had_one_of(const drive_t *drive, uint32_t generation, ui
     (void)generation;
     (void)periods;
     return false;
+}
+
+static inline void mrai_snapshot(const drive_t *drive, snapshot_t *snapshot)
+{
+    (void)drive;
+    (void)snapshot;
 }
 
 static inline void mrai_identify(drive_t *drive, const snapshot_t *snapshot)

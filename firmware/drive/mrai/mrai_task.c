@@ -2,10 +2,10 @@
 #include "drive/mrai/mrai_seam.h"
 #include "drive/mrai/schedule_box.h"
 
-void mrai_snapshot(const drive_t *drive, mrai_snapshot_t *snapshot)
+void mrai_snapshot(const drive_t *drive, snapshot_t *snapshot)
 {
-    snapshot->law = drive->mrai.isr.law;
-    snapshot->torque = drive->mrai.isr.torque;
+    snapshot->mrai.law = drive->mrai.isr.law;
+    snapshot->mrai.torque = drive->mrai.isr.torque;
 }
 
 void mrai_identify(drive_t *drive, const snapshot_t *snapshot)

@@ -485,6 +485,7 @@ void test_a_request_within_all_limits_that_the_machine_cannot_reach_is_reported(
  * check. */
 void test_an_identification_is_stalled_when_it_finishes_nothing_in_three_steps(void)
 {
+    ecu.drive.request.identification_mode = IDENTIFICATION_PAPER;
     ecu.drive.mrai.mailbox.generation = 10;
     ecu.drive.mrai.isr.finished = 9;
     ecu.drive.mrai.task.finished_seen = 8;
@@ -501,6 +502,20 @@ void test_an_identification_is_stalled_when_it_finishes_nothing_in_three_steps(v
     ecu.drive.mrai.isr.finished = 10;
     ecu.drive.samples.generation += 10U;
     ecu_watch(&ecu);
+    TEST_ASSERT_FALSE(ecu_observe(&ecu, false).stalled);
+}
+
+/* Its interrupt has no work then. */
+void test_an_identification_that_is_not_chosen_is_never_stalled(void)
+{
+    ecu.drive.request.identification_mode = IDENTIFICATION_ROBUST;
+    ecu.drive.mrai.mailbox.generation = 10;
+    ecu.drive.mrai.isr.finished = 9;
+    ecu.liveness = (liveness_t){.started = true};
+    for (uint32_t n = 1; n <= 5U; n++) {
+        ecu.drive.samples.generation += 10U;
+        ecu_watch(&ecu);
+    }
     TEST_ASSERT_FALSE(ecu_observe(&ecu, false).stalled);
 }
 

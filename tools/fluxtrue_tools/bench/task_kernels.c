@@ -82,7 +82,7 @@ CALLED void task_copy(void)
     copy = *drive_now();
     snapshot.sample = *sample_box_at(&copy.samples, copy.samples.generation);
     snapshot.window = *window_box_at(&copy.windows);
-    mrai_snapshot(&copy, &snapshot.mrai);
+    mrai_snapshot(&copy, &snapshot);
     snapshot.psi_d_error = copy.psi_d_error;
     snapshot.faults = copy.fast.faults;
     snapshot.inverter_dC = hal_temperature_inverter_dC();
