@@ -78,7 +78,7 @@ def test_the_tick_meets_its_bounds_and_the_peers_stand_beside_the_one_with_the_l
     assert page.BOUNDS["current_tick"] == (160, 214)
     assert tick[1] <= 160 and tick[2] <= 214
     assert with_tables[1] > tick[1] + tables[1] / 2
-    peers = baseline.PAGE.read_text(encoding="utf-8").split("## Beside others")[1]
+    peers = baseline.PAGE.read_text(encoding="utf-8").split("## Comparison with other projects")[1]
     ours = next(line for line in peers.splitlines() if "current control with its flux tables" in line)
     assert ours.endswith(f"| {with_tables[1]} | {with_tables[2]} |")
 

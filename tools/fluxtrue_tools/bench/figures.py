@@ -103,7 +103,7 @@ def stack_use(functions: list[disassembly.Function], port: dict[str, Any]) -> tu
 def _utilisation(runs: FIGURES, core_hz: int, column: str) -> FIGURES:
     """Shares of the processor, estimated, and the PWM frequency at which all of it takes half.
 
-    The task falls due a thousand times a second, whatever that frequency.
+    The task is counted with 1000 steps per second, whatever that frequency.
     """
     work = runs["10 kHz work"][column]
     task, can = runs["1 kHz task"][column][1] / TASK_PERIODS, runs["CAN ISR"][column][1] * COMMAND_HZ

@@ -269,7 +269,7 @@ def _utilisation(figures: Figures) -> list[str]:
 
 def _assumptions() -> list[str]:
     rows = table("memory|least|most|origin", (row[:4] for row in memory.ASSUMPTIONS))
-    return [*rows, "Where it is from:", "", *(f"- *{row[0]}*: {row[4]}." for row in memory.ASSUMPTIONS), ""]
+    return [*rows, "Sources:", "", *(f"- *{row[0]}*: {row[4]}." for row in memory.ASSUMPTIONS), ""]
 
 
 def _torque_share(stages: dict[str, list[float]]) -> float:
