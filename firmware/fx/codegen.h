@@ -2,9 +2,9 @@
 #ifndef FX_CODEGEN_H
 #define FX_CODEGEN_H
 /** Makes the compiler choose cheaper instructions; no function here changes a value.
- *   Only what the bounds of the period need is kept: without any one use the average of the fast ISR or of the tick,
- *   or the tick's maximum, exceeds its bound. Each use saves these instructions per period (emulated Cortex-M4,
- *   gcc 12.2, hsm1; measured with tools/fluxtrue bench without that one use):
+ *   Together the uses hold the averages of the fast ISR and of the tick, and the tick's maximum, within their bounds
+ *   (docs/performance.md); a use that saves nothing is not kept. Each use saves these instructions per period (emulated
+ *   Cortex-M4, gcc 12.2, hsm1; measured with tools/fluxtrue bench without that one use):
  *   use                                                   tick         fast ISR
  *   FX_LOAD_TWO       angle tracker, state and gains      2
  *                     current control, integrators        1

@@ -101,8 +101,9 @@ def table(driven: list[Driven], command: str) -> str:
     rows = ["| machine | largest change of speed, rpm/s | plants | seconds | of them with more than a quarter of the "
             "largest torque | false trips |", "|---|--:|--:|--:|--:|---|", *(one.row() for one in driven)]  # fmt: skip
     total_s, trips = sum(one.total("driven_s") for one in driven), sum(len(one.trips) for one in driven)
+    tripped = f"{trips} false trip{'' if trips == 1 else 's'}"
     text = ", ".join(f"{name} {seconds:,.0f} s" for name, seconds in kinds.items())
-    return "\n".join([*rows, "", f"Together {total_s:,.0f} s, {trips} false trips.", f"By kind: {text}.", "",
+    return "\n".join([*rows, "", f"Together {total_s:,.0f} s, {tripped}.", f"By kind: {text}.", "",
                       f"    {command}", ""])  # fmt: skip
 
 

@@ -25,8 +25,8 @@ const PARTS = [showTorque, showReasons, showNumbers, showFaults, showStand, show
 const NONE = { replay: false, scope: null, tuning: false, commission: null, title: "", words: {}, factors: {}, stand: {} }; // before the greeting
 const said = { hello: NONE, status: null, last: null, scope: null, commission: null, control: "free" };
 
-// What the parts show. A page to which the server speaks is present. If the inverter does, too, it is live; otherwise
-// it shows no values, and none of its controls acts but the end of a recording.
+// What the parts show. The page is present while it receives messages from the server. If the inverter sends, too, it is
+// live; otherwise it shows no values, and none of its controls acts but the end of a recording.
 function view() {
   const { hello, status } = said;
   const present = status !== null && !isStale();

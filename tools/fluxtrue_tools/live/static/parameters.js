@@ -66,7 +66,7 @@ function empty() {
     shown.made.className = "";
     shown.input.value = shown.input.defaultValue = shown.entered = "";
   }
-  $("tune-text").textContent = "Read shows the values of the inverter and how they differ from those of the build.";
+  $("tune-text").textContent = "Press Read to see the inverter's values and how they differ from those of the build.";
 }
 
 export function onParameters(message) {

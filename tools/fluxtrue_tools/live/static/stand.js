@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The test stand of a simulated machine: its knobs stand where the server says, on every page.
+// The test stand of a simulated machine: its sliders show the server's values, on every page.
 import { send } from "./connection.js";
 import { $, DASH, show } from "./page.js";
 

@@ -36,7 +36,7 @@ function begin(name) {
 function consent(name, limit) {
   const made = Object.assign(element("div", "", "consent"), { id: `${name}-consent` }), label = element("label", "", "check");
   label.append(Object.assign(element("input"), { type: "checkbox", id: `${name}-free`, disabled: true, onchange: () => showBegin(name) }),
-    "The shaft is free, and nothing can be caught by it: it may turn as said above.");
+    "I confirm that the shaft is free and that nothing can be caught by it. It may turn as described above.");
   made.append(element("p", "To stop: press Stop or Escape, or hide or close this page. Switching is then disabled, and the shaft "
     + `runs down by itself. Beyond ${Math.round(limit)} rpm the inverter disables switching.`), label);
   return made;
