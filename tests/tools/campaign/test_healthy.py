@@ -58,7 +58,7 @@ def test_a_trip_is_counted_by_its_name_and_ends_with_exit_code_1(program: Path) 
     bad = CliRunner().invoke(healthy.main, ["prius", "--seconds", "80"])
     assert bad.exit_code == 1
     assert "| `prius` | 40,000 | 8 | 80 | 25 % | 1: `angle_jump` 1 |" in bad.output
-    assert "Together 80 s, 1 false trips." in bad.output
+    assert "Together 80 s, 1 false trip." in bad.output
     assert "By kind: kerb 60 s, slip 20 s." in bad.output
 
 

@@ -67,3 +67,26 @@ def test_an_interrupted_campaign_does_not_wait_for_the_cases_that_run() -> None:
     assert next(results) == (0, 0)
     results.close()  # type: ignore[attr-defined]
     assert multiprocessing.active_children() == []
+
+
+def same(case: int) -> int:
+    return case
+
+
+def test_only_a_few_cases_are_submitted_at_a_time() -> None:
+    """With all of 100,000 at once the pool sometimes blocked for ever on a busy computer."""
+    drawn: list[int] = []
+
+    def cases() -> Iterator[int]:
+        for case in range(100_000):
+            drawn.append(case)
+            yield case
+
+    results = schedule.local(same, cases(), 1)
+    assert next(results) == (0, 0)
+    assert len(drawn) <= 2 * schedule.SUBMITTED_PER_WORKER
+    results.close()  # type: ignore[attr-defined]
+
+
+def test_every_case_is_run_once() -> None:
+    assert sorted(schedule.local(same, range(50), 2)) == [(case, case) for case in range(50)]

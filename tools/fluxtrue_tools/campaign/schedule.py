@@ -6,9 +6,10 @@ import multiprocessing
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from itertools import islice
 from typing import Any
 
 from tqdm import tqdm
@@ -20,6 +21,7 @@ from fluxtrue_tools.errors import FluxtrueError
 Task = Callable[[int], Any]
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 SCHEDULER_S = 60  # long enough for a busy scheduler
+SUBMITTED_PER_WORKER = 4  # enough that no worker waits while results are stored
 
 
 def _worker() -> None:
@@ -33,15 +35,23 @@ def _worker() -> None:
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
-def local(task: Task, cases: list[int], workers: int | None) -> Iterator[tuple[int, Any]]:
-    """(case, result) in the order they finish."""
+def local(task: Task, cases: Iterable[int], workers: int | None) -> Iterator[tuple[int, Any]]:
+    """(case, result) in the order they finish; those that have finished together, by their number.
+
+    Only a few cases are submitted at a time. Each submission writes to a pipe of the pool while it holds a lock that
+    the pool's thread needs to empty the pipe: with some 16,000 at once, on a busy computer, both wait without end.
+    """
     others = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(max_workers=workers or len(os.sched_getaffinity(0)), initializer=_worker)
+    count = workers or len(os.sched_getaffinity(0))
+    pool = ProcessPoolExecutor(max_workers=count, initializer=_worker)
+    left = iter(cases)
     try:
-        waiting = {pool.submit(task, case): case for case in cases}
-        for future in as_completed(waiting):
-            interrupts.raise_if_received()
-            yield waiting[future], future.result()
+        waiting = {pool.submit(task, case): case for case in islice(left, SUBMITTED_PER_WORKER * count)}
+        while waiting:
+            for future in sorted(wait(waiting, return_when=FIRST_COMPLETED).done, key=waiting.__getitem__):
+                interrupts.raise_if_received()
+                yield waiting.pop(future), future.result()
+                waiting |= {pool.submit(task, case): case for case in islice(left, 1)}
     except BaseException as error:
         # The results of the cases that run would be lost. A pool that has lost a worker would wait without end for the
         # others, which ignore its SIGTERM; one that a signal has interrupted may, too.
