@@ -9,7 +9,7 @@
 #define SPEED_VALID 0x20000U
 #define LINES 0xFFFFU
 
-enum { MAGIC_WORD, SEQUENCE, FLAGS, SPEED_AND_V_DC, PSI_DELTA, WORDS };
+enum { MAGIC_WORD, SEQUENCE, FLAGS, SPEED_AND_V_DC, PSI_D_ERROR, WORDS };
 
 typedef struct {
     uint32_t word[WORDS], complement[WORDS];
@@ -57,7 +57,7 @@ bool retained_read(retained_t *retained)
     retained->drive = (before_reset_t){
         .speed = (int16_t)word[SPEED_AND_V_DC],
         .v_dc = (int16_t)(word[SPEED_AND_V_DC] >> 16),
-        .psi_d_error = (int16_t)word[PSI_DELTA],
+        .psi_d_error = (int16_t)word[PSI_D_ERROR],
         .armed = (word[FLAGS] & ARMED) != 0U,
         .speed_valid = (word[FLAGS] & SPEED_VALID) != 0U,
     };
@@ -72,7 +72,7 @@ void retained_write(const retained_t *retained)
         [SEQUENCE] = sequence,
         [FLAGS] = (retained->lines & LINES) | (drive->armed ? ARMED : 0U) | (drive->speed_valid ? SPEED_VALID : 0U),
         [SPEED_AND_V_DC] = (uint16_t)drive->speed | (uint32_t)drive->v_dc << 16,
-        [PSI_DELTA] = (uint16_t)drive->psi_d_error,
+        [PSI_D_ERROR] = (uint16_t)drive->psi_d_error,
     };
     volatile copy_t *to = &copies[sequence & 1U];
     SIM->CHIPCTL = SIM->CHIPCTL | SIM_CHIPCTL_SRAMU_RETEN;

@@ -481,40 +481,45 @@ void test_a_request_within_all_limits_that_the_machine_cannot_reach_is_reported(
     TEST_ASSERT_EQUAL_UINT32(REQUEST_LIMIT_REACH, telemetry.request_limit);
 }
 
+/* The MRAI interrupt has not finished its newest point. */
+static void begin_with_an_unfinished_point(identification_mode_t mode)
+{
+    ecu.drive.request.identification_mode = mode;
+    ecu.drive.mrai.mailbox.generation = 10;
+    ecu.drive.mrai.isr.finished = 9;
+    ecu.liveness = (liveness_t){.started = true};
+}
+
+static void watch_a_step(void)
+{
+    ecu.drive.samples.generation += 10U;
+    ecu_watch(&ecu);
+}
+
 /* The paper's identification is not stalled while it works on the newest point, if it has finished one since the last
  * check. */
 void test_an_identification_is_stalled_when_it_finishes_nothing_in_three_steps(void)
 {
-    ecu.drive.request.identification_mode = IDENTIFICATION_PAPER;
-    ecu.drive.mrai.mailbox.generation = 10;
-    ecu.drive.mrai.isr.finished = 9;
+    begin_with_an_unfinished_point(IDENTIFICATION_PAPER);
     ecu.drive.mrai.task.finished_seen = 8;
-    ecu.liveness = (liveness_t){.started = true};
     for (uint32_t n = 1; n <= 3U; n++) {
-        ecu.drive.samples.generation += 10U;
-        ecu_watch(&ecu);
+        watch_a_step();
         TEST_ASSERT_EQUAL_UINT8(n - 1U, ecu.liveness.stalled_in_a_row);
     }
     TEST_ASSERT_FALSE(ecu_observe(&ecu, false).stalled);
-    ecu.drive.samples.generation += 10U;
-    ecu_watch(&ecu);
+    watch_a_step();
     TEST_ASSERT_TRUE(ecu_observe(&ecu, false).stalled);
     ecu.drive.mrai.isr.finished = 10;
-    ecu.drive.samples.generation += 10U;
-    ecu_watch(&ecu);
+    watch_a_step();
     TEST_ASSERT_FALSE(ecu_observe(&ecu, false).stalled);
 }
 
 /* Its interrupt has no work then. */
 void test_an_identification_that_is_not_chosen_is_never_stalled(void)
 {
-    ecu.drive.request.identification_mode = IDENTIFICATION_ROBUST;
-    ecu.drive.mrai.mailbox.generation = 10;
-    ecu.drive.mrai.isr.finished = 9;
-    ecu.liveness = (liveness_t){.started = true};
+    begin_with_an_unfinished_point(IDENTIFICATION_ROBUST);
     for (uint32_t n = 1; n <= 5U; n++) {
-        ecu.drive.samples.generation += 10U;
-        ecu_watch(&ecu);
+        watch_a_step();
     }
     TEST_ASSERT_FALSE(ecu_observe(&ecu, false).stalled);
 }
