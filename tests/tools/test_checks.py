@@ -236,9 +236,9 @@ def test_a_planted_paragraph_in_a_cell_is_found(tree: Path) -> None:
     assert check("style", tree) == (1, "docs/bad.md:5: 257 columns in a cell, at most 130\n")
 
 
-def test_what_a_reader_does_not_see_does_not_count_as_width(tree: Path) -> None:
+def test_what_a_reader_does_not_see_does_not_count_as_width_of_a_cell(tree: Path) -> None:
     text = "word " * 15 + "<!-- figure: command_time_out -->30 ms, see [can](../howto/can.md#a-long-anchor)"
-    write(tree, "docs/good.md", text + "\n")
+    write(tree, "docs/good.md", f"| a | {text} |\n")
     assert check("style", tree) == (0, "")
 
 
@@ -252,6 +252,7 @@ def test_what_a_reader_does_not_see_does_not_count_as_width(tree: Path) -> None:
         (f"$$\na=b\n$$\n{LONG}", 4),
         (f"    code\n\n{LONG}", 3),
         (f"# {LONG}", 1),
+        ("x" * 100 + f" [page](../{'y' * 60}.md).", 1),
     ],
 )
 def test_a_planted_line_of_prose_that_is_too_wide_is_found(tree: Path, text: str, line: int) -> None:
@@ -272,10 +273,10 @@ def test_a_planted_line_of_prose_that_is_too_wide_is_found(tree: Path, text: str
         f"```c\n{LONG}\n```",
         f"$$\n{LONG}\n$$",
         f"![{LONG}](images/a.png)",
-        "x" * 100 + f" [page](../{'y' * 60}.md).",
+        f"- [page](../{'y' * 120}.md).",
     ],
 )
-def test_code_equations_and_link_targets_may_be_wide(tree: Path, text: str) -> None:
+def test_code_equations_and_a_single_link_may_be_wide(tree: Path, text: str) -> None:
     (tree / "docs/good.md").write_text(text + "\n")
     assert check("style", tree) == (0, "")
 
