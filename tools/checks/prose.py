@@ -14,8 +14,6 @@ MAX_CELL = 130
 
 LINK_TARGET = re.compile(r"\]\([^()\s]*\)")
 MARK = re.compile(r"<!--.*?-->")
-# What one line has to contain whole: a mark, and the target of a link.
-UNBROKEN = re.compile(f"{MARK.pattern}|{LINK_TARGET.pattern}")
 MARKER = re.compile(r"^\s*(?:[-*+]|\d+\.)?\s*")
 IMAGE = re.compile(r"\s*!\[[^\]]*\]\([^)]*\)\s*")
 
@@ -54,7 +52,7 @@ def prose(text: list[str]) -> Iterator[tuple[int, str]]:
 
 def breakable(line: str) -> bool:
     """A line of several words: a single link, with or without a bullet, cannot be made narrower."""
-    return " " in UNBROKEN.sub("", MARKER.sub("", line))
+    return " " in visible(MARKER.sub("", line))
 
 
 def widest_cell(line: str) -> int:
