@@ -6,6 +6,7 @@ import os
 import pickle
 import signal
 from collections.abc import Iterator
+from functools import partial
 
 import pytest
 
@@ -64,6 +65,19 @@ def only_the_first_ends(case: int) -> int:
 
 def test_an_interrupted_campaign_does_not_wait_for_the_cases_that_run() -> None:
     results = schedule.local(only_the_first_ends, [0, 1], 2)
+    assert next(results) == (0, 0)
+    results.close()  # type: ignore[attr-defined]
+    assert multiprocessing.active_children() == []
+
+
+def of_a_large_campaign(campaign: bytes, case: int) -> int:
+    assert campaign
+    return only_the_first_ends(case)
+
+
+def test_an_interrupted_campaign_ends_even_if_its_task_is_larger_than_a_pipe() -> None:
+    """The thread that hands cases over must never wait for a worker that has been killed."""
+    results = schedule.local(partial(of_a_large_campaign, bytes(2_000_000)), range(10), 2)
     assert next(results) == (0, 0)
     results.close()  # type: ignore[attr-defined]
     assert multiprocessing.active_children() == []

@@ -24,15 +24,25 @@ SCHEDULER_S = 60  # long enough for a busy scheduler
 SUBMITTED_PER_WORKER = 4  # enough that no worker waits while results are stored
 
 
-def _worker() -> None:
+_tasks: list[Task] = []  # of a worker process: the one that it runs
+
+
+def _worker(task: Task) -> None:
     """The parent alone handles the signals of a process group; a worker ends with it.
 
-    A pool whose workers have ended by themselves cannot always be shut down.
+    A pool whose workers have ended by themselves cannot always be shut down. The task is handed over here, once: a
+    task may contain a whole campaign, and if each case carried it, the pipe to the workers would be full. The thread
+    that writes to it would then wait without end for workers that have been killed.
     """
+    _tasks[:] = [task]
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def _run(case: int) -> Any:
+    return _tasks[0](case)
 
 
 def local(task: Task, cases: Iterable[int], workers: int | None) -> Iterator[tuple[int, Any]]:
@@ -43,15 +53,15 @@ def local(task: Task, cases: Iterable[int], workers: int | None) -> Iterator[tup
     """
     others = set(multiprocessing.active_children())
     count = workers or len(os.sched_getaffinity(0))
-    pool = ProcessPoolExecutor(max_workers=count, initializer=_worker)
+    pool = ProcessPoolExecutor(max_workers=count, initializer=_worker, initargs=(task,))
     left = iter(cases)
     try:
-        waiting = {pool.submit(task, case): case for case in islice(left, SUBMITTED_PER_WORKER * count)}
+        waiting = {pool.submit(_run, case): case for case in islice(left, SUBMITTED_PER_WORKER * count)}
         while waiting:
             for future in sorted(wait(waiting, return_when=FIRST_COMPLETED).done, key=waiting.__getitem__):
                 interrupts.raise_if_received()
                 yield waiting.pop(future), future.result()
-                waiting |= {pool.submit(task, case): case for case in islice(left, 1)}
+                waiting |= {pool.submit(_run, case): case for case in islice(left, 1)}
     except BaseException as error:
         # The results of the cases that run would be lost. A pool that has lost a worker would wait without end for the
         # others, which ignore its SIGTERM; one that a signal has interrupted may, too.
