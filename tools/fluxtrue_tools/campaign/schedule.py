@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from typing import Any
@@ -55,13 +55,17 @@ def local(task: Task, cases: Iterable[int], workers: int | None) -> Iterator[tup
     count = workers or len(os.sched_getaffinity(0))
     pool = ProcessPoolExecutor(max_workers=count, initializer=_worker, initargs=(task,))
     left = iter(cases)
+
+    def submitted(number: int) -> dict[Future[Any], int]:
+        return {pool.submit(_run, case): case for case in islice(left, number)}
+
     try:
-        waiting = {pool.submit(_run, case): case for case in islice(left, SUBMITTED_PER_WORKER * count)}
+        waiting = submitted(SUBMITTED_PER_WORKER * count)
         while waiting:
             for future in sorted(wait(waiting, return_when=FIRST_COMPLETED).done, key=waiting.__getitem__):
                 interrupts.raise_if_received()
                 yield waiting.pop(future), future.result()
-                waiting |= {pool.submit(_run, case): case for case in islice(left, 1)}
+                waiting |= submitted(1)
     except BaseException as error:
         # The results of the cases that run would be lost. A pool that has lost a worker would wait without end for the
         # others, which ignore its SIGTERM; one that a signal has interrupted may, too.
