@@ -162,6 +162,7 @@ typedef struct {
     uint32_t commissionings;     /* of the request, as far as seen */
     dq_q15_t i_ref;              /* acts until the next step */
     dq_q15_t psi_ref;            /* tables' flux at the last reference */
+    rotating_flux_t rotating;    /* whose rotational voltage the target makes (CC-25) */
     dead_time_trim_state_t trim; /* of the compensation: added while driving */
     uint16_t derating;           /* DERATING_...: reasons for less than the requested torque */
     q15_t torque_commanded;      /* the limited torque after slew */

@@ -81,7 +81,6 @@ typedef struct {
     bool upper;            /* the short circuit is made by the upper switches */
     uint32_t faults;       /* found by the task; latched by the fast ISR, which alone writes the fault word */
     uint32_t fault_resets; /* counts up: the fast ISR clears its faults once for each count */
-    FX_PADDING_WORD;
 } command_t;
 
 FX_POWER_OF_TWO_SIZE(command_t);

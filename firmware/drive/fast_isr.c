@@ -26,7 +26,6 @@
 typedef struct {
     fx_pair_t i_dq, advanced;
     int32_t v_dc;
-    q31_t omega;
     int32_t angle_step;
 } rotor_frame_t;
 
@@ -84,10 +83,10 @@ static void count_since_enable(fast_state_t *fast, sample_t *sample)
     }
 }
 
-static current_control_in_t control_inputs(const drive_t *drive, const sample_t *sample, const rotor_frame_t *now,
+static current_control_in_t control_inputs(const sample_t *sample, const rotor_frame_t *now,
                                            const current_target_t *target)
 {
-    return (current_control_in_t){target, &sample->point.flux, now->omega, drive->psi_d_error, now->v_dc};
+    return (current_control_in_t){target, &sample->point.flux, now->v_dc};
 }
 
 /* Current control of a motor whose field turns far in a period. */
@@ -95,8 +94,8 @@ static FX_NOT_INLINED FX_COLD current_control_out_t control_turning(drive_t *dri
                                                                     const rotor_frame_t *now,
                                                                     const current_target_t *target)
 {
-    turning_control_in_t in = {control_inputs(drive, sample, now, target), sample->point.i, now->angle_step};
-    in.control.omega = now->omega >> 31;
+    const turning_control_in_t in = {control_inputs(sample, now, target), sample->point.i, now->angle_step,
+                                     drive->psi_d_error};
     return turning_control_step(&drive->motor->turning_control, &drive->parameters.current_control,
                                 &drive->fast.turning_control, &in);
 }
@@ -146,7 +145,7 @@ static FX_NOT_INLINED FX_COLD void write_duties_turning(drive_t *drive, sample_t
 static inline FX_INLINED void control_currents(drive_t *drive, sample_t *sample, const rotor_frame_t *now,
                                                const current_target_t *target)
 {
-    const current_control_in_t in = control_inputs(drive, sample, now, target);
+    const current_control_in_t in = control_inputs(sample, now, target);
     write_duties(drive, sample, now,
                  current_control_step(&drive->parameters.current_control, &drive->fast.current_control, &in), NULL);
 }
@@ -170,7 +169,7 @@ static rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *sample, int32_t an
     const uint32_t ahead = (uint32_t)angle_step + (uint32_t)(angle_step >> 1);
     const fx_pair_t advanced = fx_rotation(sample->theta_e + ahead);
     sample->point.flux = flux_table_step(&drive->period.flux_table, measured);
-    return (rotor_frame_t){fx_pair(measured.d, measured.q), advanced, sample->v_dc, sample->point.omega, angle_step};
+    return (rotor_frame_t){fx_pair(measured.d, measured.q), advanced, sample->v_dc, angle_step};
 }
 
 /* During the pulses only the monitors of the samples act: there is no identification and no slow monitor. */

@@ -87,6 +87,9 @@ static bool turning_gains_valid(const turning_control_config_t *c)
            c->drop_q29 >= 0 && c->knee_turns_q27 > 0;
 }
 
+/* The target divides by sigma in Q16. */
+#define SIGMA_MIN_Q24 256
+
 /* A tracker with a turn_shift may run only on the route of the law for a field that turns far. That law uses the usual
  * one as its voltage limit, which must then have no gains. */
 static bool turning_valid(const motor_t *m)
@@ -94,7 +97,7 @@ static bool turning_valid(const motor_t *m)
     const turning_control_config_t *c = &m->turning_control;
     const current_control_config_t *limits = &m->parameters.current_control;
     if (!turning_control_used(c)) {
-        return m->angle_tracker.turn_shift == 0U && limits->sigma_q24 > 0;
+        return m->angle_tracker.turn_shift == 0U && limits->sigma_q24 >= SIGMA_MIN_Q24;
     }
     return turning_gains_valid(c) && limits->sigma_q24 == 0 && limits->integral_gain == 0 &&
            m->angle_tracker.turn_shift <= 1U;

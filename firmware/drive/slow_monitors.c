@@ -3,6 +3,7 @@
 
 #include "control/current/transform.h"
 #include "drive/mrai/mrai_seam.h"
+#include "drive/step_mean.h"
 
 static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
 {
@@ -10,17 +11,6 @@ static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
     const int32_t alpha = transform_round(q30.alpha);
     const abc_t x = inverse_clarke(alpha, fx_mul_q15((q15_t)transform_round(q30.beta), Q15(SQRT3_HALF)));
     return (abc_q15_t){x.a, x.b, x.c};
-}
-
-/* Mean current of the last step; with the paper's identification, which sums no window, the current of the sample. */
-static dq_q15_t mean_current(const drive_t *drive, const snapshot_t *snapshot)
-{
-    if (mrai_is_chosen(drive) || !snapshot->window.acting) {
-        return snapshot->sample.point.i;
-    }
-    const int32_t half_gain_q32 = drive->motor->identify.mean_gain_q32;
-    return (dq_q15_t){fx_mulhi(2 * snapshot->window.sum_i.d, half_gain_q32),
-                      fx_mulhi(2 * snapshot->window.sum_i.q, half_gain_q32)};
 }
 
 static uint8_t gate_exceeded_steps(const drive_t *drive)
@@ -47,7 +37,7 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q
         .voltage_limited = sample->voltage_limited,
         .i = sample->point.i,
         .i_ref = task->i_ref,
-        .i_mean = mean_current(drive, snapshot),
+        .i_mean = step_mean_current(drive, snapshot),
         .phases = measure_phases(sample->i_ab, sample->zero_q28),
         .phases_ref = at_once ? phases_ref : in_phases(expected, sample->theta_e),
         .omega = fx_q15_from_q31(sample->point.omega),
@@ -131,7 +121,7 @@ static bool is_near_reference(const drive_t *drive, dq_q15_t i)
 static bool is_controlled(const drive_t *drive, const snapshot_t *snapshot)
 {
     return is_near_reference(drive, snapshot->sample.point.i) ||
-           is_near_reference(drive, mean_current(drive, snapshot));
+           is_near_reference(drive, step_mean_current(drive, snapshot));
 }
 
 /* A prediction replaces a sample that no rotor can have (AT-14), and a rotor that stops within milliseconds may look

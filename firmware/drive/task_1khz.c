@@ -4,6 +4,7 @@
 #include "drive/mrai/mrai_seam.h"
 #include "drive/safe_decision.h"
 #include "drive/slow_monitors.h"
+#include "drive/step_mean.h"
 #include "drive/switch_off.h"
 #include "drive/tracked_speed.h"
 #include "fx/vec.h"
@@ -47,7 +48,7 @@ static voltage_reserve_t update_voltage_reserve(drive_t *drive, const snapshot_t
 {
     task_state_t *task = &drive->task;
     const voltage_reserve_in_t in = {
-        .u = snapshot->sample.point.u,
+        .u = step_mean_voltage(drive, snapshot),
         .v_dc = (q15_t)snapshot->sample.v_dc,
         .psi = task->psi_ref,
         .psi_plan = task->reference.psi_plan,
@@ -180,9 +181,11 @@ static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_
         commanded->flux = flux_table_step(&drive->motor->flux_table, commanded->i);
         task->i_ref = commanded->i;
         task->psi_ref = (dq_q15_t){commanded->flux.psi_d, commanded->flux.psi_q};
-        command.target = current_control_target(&drive->parameters.current_control, commanded->i, &commanded->flux);
+        command.target = current_control_target(&drive->parameters.current_control, commanded,
+                                                current_control_by_target(snapshot->psi_d_error), &task->rotating);
     } else {
         reset_torque_path(drive);
+        task->rotating = (rotating_flux_t){.psi = {(q15_t)commanded->flux.psi_d, (q15_t)commanded->flux.psi_q}};
     }
     command.safe = safe_decision_step(drive, snapshot);
     command.upper = safe_decision_is_upper(drive);

@@ -158,6 +158,11 @@ static inline uint32_t fx_arch_pkhtb(int32_t hi, int32_t lo)
     return y;
 }
 
+static inline uint32_t fx_arch_qsub16(uint32_t a, uint32_t b)
+{
+    return (uint32_t)__qsub16((int16x2_t)a, (int16x2_t)b);
+}
+
 static inline int32_t fx_arch_smuad(uint32_t a, uint32_t b)
 {
     return __smuad((int16x2_t)a, (int16x2_t)b);

@@ -109,6 +109,14 @@ static inline uint32_t fx_arch_pkhtb(int32_t hi, int32_t lo)
     return ((uint32_t)hi & 0xFFFF0000U) | ((uint32_t)lo >> 16);
 }
 
+/* Each half saturates by itself. */
+static inline uint32_t fx_arch_qsub16(uint32_t a, uint32_t b)
+{
+    const int16_t low = fx_arch_ssat16((int32_t)(int16_t)(a & 0xFFFFU) - (int16_t)(b & 0xFFFFU));
+    const int16_t high = fx_arch_ssat16((int32_t)(int16_t)(a >> 16) - (int16_t)(b >> 16));
+    return fx_arch_pkhbt(low, high);
+}
+
 static inline int32_t fx_arch_smlad(uint32_t a, uint32_t b, int32_t acc)
 {
     const int32_t low = (int32_t)(int16_t)(a & 0xFFFFU) * (int16_t)(b & 0xFFFFU);

@@ -22,7 +22,7 @@
  *                     timer of hal/s32k144/pwm.c                       2
  *                     slot of the command                              2
  *                     point of the sine table             2            2 (1 kHz task: 11)
- *   FX_PADDING_WORD   sample and command                               9 to 11
+ *   FX_PADDING_WORD   sample                                           9 to 11
  *   FX_PADDING_FLAG   sample                                           2
  * The following save, measured without all uses of one of them at once (the drive's program of tools/fluxtrue bench):
  *   FX_USUALLY                1.4 instructions of the tick, 5 of its maximum, with the look-up's hints

@@ -89,6 +89,12 @@ static inline fx_pair_t fx_pair(int32_t lo, int32_t hi)
     return fx_arch_pkhbt(lo, hi);
 }
 
+/* The differences of the halves, each saturated. */
+static inline fx_pair_t fx_pair_sub(fx_pair_t a, fx_pair_t b)
+{
+    return fx_arch_qsub16(a, b);
+}
+
 /* a.lo * b.lo + a.hi * b.hi, Q30; wraps only when all four are -1. */
 static inline int32_t fx_dot2(fx_pair_t a, fx_pair_t b)
 {

@@ -11,6 +11,8 @@
 #define MOVING_STEPS 4      /* after a change: the mean is the present value, without the voltage of the transient */
 #define MEAN_SHIFT 2
 #define FIRST_SHIFT 12
+#define EARLY_STEPS 16 /* after the means have settled: with noise, m_0 becomes a mean over EARLY_SHIFT */
+#define EARLY_SHIFT 3
 #define NOISE_SHIFT 4
 #define NOISE_MAX 8 /* times v_1: largest noise of one step, as the currents may change without the reference */
 
@@ -36,20 +38,30 @@ static int32_t other_power(const launch_power_in_t *in, int32_t omega)
     return times(in->u_standing.d, in->i_ref.d) + times(in->u_standing.q, in->i_ref.q) - times(omega, torque);
 }
 
+/* How fast m_0 follows. An error of m_0 by the noise of its time would last. */
+static int first_shift(const launch_power_config_t *config, const launch_power_state_t *state, int32_t loss_max)
+{
+    const bool early = state->steady < config->settle_steps + EARLY_STEPS;
+    return (early && 2 * (state->noise_q8 >> 8) > loss_max) ? EARLY_SHIFT : FIRST_SHIFT;
+}
+
 /* (MN-39) */
-static void update_noise(const launch_power_config_t *config, launch_power_state_t *state, int32_t power, bool settled)
+static void update_noise(const launch_power_config_t *config, launch_power_state_t *state, int32_t power,
+                         int32_t loss_max)
 {
     if (state->steady < MOVING_STEPS) {
         return; /* a voltage that changes the currents is not noise */
     }
     const int32_t deviation = power - (state->power_q8 >> 8);
     const bool above = deviation > 0;
-    const int32_t largest = NOISE_MAX * times(config->v_1, fx_magnitude(state->i_ref.d, state->i_ref.q));
-    const int32_t limited = fx_min_s32(fx_abs_q31(deviation), fx_min_s32(largest, UINT16_MAX));
+    const int32_t limited = fx_min_s32(fx_abs_q31(deviation), fx_min_s32(NOISE_MAX * loss_max, UINT16_MAX));
     const int32_t noise_q8 = (above != state->above) ? limited * 256 : 0; /* noise changes its sign, a fault does not */
+    const bool settled = state->steady >= config->settle_steps;
     state->above = above;
     state->noise_q8 = mean_step(state->noise_q8, noise_q8, settled ? NOISE_SHIFT : MEAN_SHIFT);
-    state->first_noise_q8 = settled ? mean_step(state->first_noise_q8, state->noise_q8, FIRST_SHIFT) : state->noise_q8;
+    const int shift = first_shift(config, state, loss_max);
+    const int32_t of_first_q8 = (shift == EARLY_SHIFT) ? state->noise_q8 / 2 : state->noise_q8;
+    state->first_noise_q8 = settled ? mean_step(state->first_noise_q8, of_first_q8, shift) : state->noise_q8;
 }
 
 /* True while there is a power to compare with. */
@@ -64,18 +76,29 @@ static bool update_means(const launch_power_config_t *config, launch_power_state
     }
     const int shift = (state->steady < MOVING_STEPS) ? 0 : MEAN_SHIFT;
     const int32_t power = other_power(in, omega);
-    update_noise(config, state, power, state->steady >= config->settle_steps);
+    const int32_t loss_max = times(config->v_1, fx_magnitude(state->i_ref.d, state->i_ref.q));
+    update_noise(config, state, power, loss_max);
     state->power_q8 = mean_step(state->power_q8, power * 256, shift);
     state->omega_q8 = mean_step(state->omega_q8, omega * 256, shift);
-    if (state->steady < config->settle_steps) {
+    const bool settled = state->steady >= config->settle_steps;
+    const int first = first_shift(config, state, loss_max);
+    if (state->steady < config->settle_steps + EARLY_STEPS) {
         state->steady++;
+    }
+    if (!settled) {
         state->first_power_q8 = state->power_q8;
         state->first_omega_q8 = state->omega_q8;
         return false;
     }
-    state->first_power_q8 = mean_step(state->first_power_q8, state->power_q8, FIRST_SHIFT);
-    state->first_omega_q8 = mean_step(state->first_omega_q8, state->omega_q8, FIRST_SHIFT);
+    state->first_power_q8 = mean_step(state->first_power_q8, state->power_q8, first);
+    state->first_omega_q8 = mean_step(state->first_omega_q8, state->omega_q8, first);
     return true;
+}
+
+/* What noise may change m - m_0 by: the variances of both means add up. Halves, which are q15; 2 sqrt(2) in Q7. */
+static int32_t noise_of_change(const launch_power_state_t *state)
+{
+    return (362 * fx_magnitude(state->noise_q8 >> 9, state->first_noise_q8 >> 9)) >> 7;
 }
 
 /* (MN-29) */
@@ -85,8 +108,7 @@ static bool is_wrong(const launch_power_config_t *config, const launch_power_sta
     const q15_t current = fx_magnitude(in->i_ref.d, in->i_ref.q);
     const int32_t omega = fx_abs_q31(state->omega_q8 - state->first_omega_q8) >> 8;
     const int32_t psi = config->psi_share + (fx_abs_q15(in->psi_ref.q) >> 3);
-    const int32_t noise = fx_max_s32(state->noise_q8, state->first_noise_q8) >> 8;
-    const int32_t loss_max = fx_max_s32(times(config->v_1, current), 2 * noise);
+    const int32_t loss_max = fx_max_s32(times(config->v_1, current), noise_of_change(state));
     const int32_t change = (state->power_q8 - state->first_power_q8) >> 8;
     return current > config->i_min && fx_abs_q31(change) > loss_max + times(2 * times(omega, psi), current);
 }

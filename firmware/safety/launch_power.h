@@ -6,12 +6,12 @@
  * the tables give.
  *   p = u.i* - w t, u without the voltage that changes the flux, w from the angles at both ends of the step
  *   m, n: first-order means of p and w, four steps, begun anew when the reference moves
- *   m_0, n_0: m and n when the reference came to a standstill; follow in 4096 steps
+ *   m_0, n_0: m and n when the reference came to a standstill; follow in 4096 steps, with much noise in 8 at first
  *   r: mean over 16 steps of |p - m| where p - m has changed its sign, else 0, of each step at most 8 |i*| v_1: the
- *   noise of the current sensors; r_0 follows it as m_0 follows m. Until the means have settled r is a mean over 4
- *   steps and r_0 = r; the first 4 steps after a movement are not counted
- *   |m - m_0| > max(|i*| v_1, 2 r, 2 r_0) + |i*| |n - n_0|(psi_f/5 + |psi_q|/8) in a row of steps; no check below
- *   |i*| = i_min
+ *   noise of the current sensors; r_0 follows it as m_0 follows m, in the 8 steps to half of r. Until the means have
+ *   settled r is a mean over 4 steps and r_0 = r; the first 4 steps after a movement are not counted
+ *   |m - m_0| > max(|i*| v_1, sqrt(2 r^2 + 2 r_0^2)) + |i*| |n - n_0|(psi_f/5 + |psi_q|/8) in a row of steps; no check
+ *   below |i*| = i_min
  * Source   docs/theory/monitors.md (MN-28), (MN-29), (MN-39)
  * Units    voltages and speeds per unit times the periods of a step, angle 2^32 = one turn
  * Range    |u| <= 43 * 2^15, as of 40 periods and 1/(w_b T_s) = 3; every other argument

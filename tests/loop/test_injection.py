@@ -12,6 +12,7 @@ import pytest
 from fluxtrue_tools.motor.current_loop import CurrentLoop, Response, current_loop, model_response
 from fluxtrue_tools.motor.current_steps import steps
 from fluxtrue_tools.motor.injection import measure
+from fluxtrue_tools.motor.loop_report import PHASE_MARGIN_MIN_DEG
 from fluxtrue_tools.motor.margins import margins
 from fluxtrue_tools.motor.motor import Motor, load_motor
 from fluxtrue_tools.motor.simulated import Simulated, simulated
@@ -72,6 +73,17 @@ def test_without_iron_loss_and_dead_time_they_are_exactly_those_of_the_model(dri
     gain_dB, phase_deg = compared((motor, replace(data, plant=data.plant | ideal)), share, 1.0)
     assert gain_dB <= 0.3
     assert phase_deg <= 2.0
+
+
+@pytest.mark.parametrize(("share", "torque_sign"), [(0.5, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)])
+def test_the_measured_phase_margin_is_40_degrees_and_more_in_each_quadrant(
+    drive: Drive, share: float, torque_sign: float
+) -> None:
+    """With 25 % less inductance than the data, which is the worst."""
+    motor, data = drive
+    found = margins(measure(data, motor, share * motor.config.machine.speed_max_rpm, 0.75, torque_sign))
+    print(f"{motor.config.machine.name}, {share:g} of top speed, torque {torque_sign:+g}: {found}")
+    assert found.phase_deg >= PHASE_MARGIN_MIN_DEG
 
 
 def test_a_model_that_is_wrong_is_found(drive: Drive) -> None:

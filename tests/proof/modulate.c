@@ -95,11 +95,13 @@ void proof_voltage_circle_changes_nothing_inside(void)
 
 void proof_integrator_stays_in_range(void)
 {
-    int32_t s_q30, gain, psi, psi_ref;
-    ASSUME(WITHIN(s_q30, -(1 << 30), (1 << 30) - 1) && WITHIN(gain, 0, Q15(0.5) - 1) && IS_Q15(psi) && IS_Q15(psi_ref));
-    const int32_t next = integrate(s_q30, gain, psi_ref - psi);
-    PROVE(WITHIN(next, -(1 << 30), (1 << 30) - 1));
-    PROVE(psi != psi_ref || next == s_q30);
+    current_control_state_t s, next;
+    int32_t gain, turn, d, q;
+    ASSUME(WITHIN(s.s_d_q30, -(1 << 30), (1 << 30) - 1) && WITHIN(s.s_q_q30, -(1 << 30), (1 << 30) - 1));
+    ASSUME(WITHIN(gain, 0, Q15(0.5) - 1) && WITHIN(turn, -gain, gain) && IS_Q15(d) && IS_Q15(q));
+    integrate(&next, s, fx_pair(turn, gain), fx_pair(d, q));
+    PROVE(WITHIN(next.s_d_q30, -(1 << 30), (1 << 30) - 1) && WITHIN(next.s_q_q30, -(1 << 30), (1 << 30) - 1));
+    PROVE(d != 0 || q != 0 || (next.s_d_q30 == s.s_d_q30 && next.s_q_q30 == s.s_q_q30));
 }
 
 void proof_reciprocal_of_the_dc_voltage(void)

@@ -8,29 +8,66 @@
 
 #define HALF_LSB_Q22 64
 #define V_D_MIN Q15(0.7) /* share of the circle that the d axis may always use (CC-11) */
+#define REACHED_SHIFT 4      /* psi_f/16: what is left of a change is made at once (CC-25) */
 
-void current_control_reset(current_control_state_t *state)
+/* Two halfwords that lie side by side, by one load. */
+static fx_pair_t pair_of(q15_t low, q15_t high)
 {
-    *state = (current_control_state_t){0};
+    return (uint16_t)low | ((uint32_t)(uint16_t)high << 16);
 }
 
-/* f = psi* - (1 - b)(l i*) + (r/sigma) i*, where l i* is psi* minus the magnet's flux (CC-5). */
-static FX_COLD int32_t weighted_reference(const current_control_config_t *config, int32_t psi, int32_t psi_magnet,
-                                          int32_t i_ref)
+/* psi* - (1 - b)(l i*), where l i* is psi* minus the magnet's flux (CC-5). Q31 * Q16 = Q15. */
+static inline int32_t weighted_flux(int32_t weight_q31, int32_t psi, int32_t psi_magnet)
 {
-    const int32_t l_i = fx_sat_q15_word(psi - psi_magnet);
-    const int32_t reduction = l_i - fx_mul_q15(config->setpoint_weight, l_i);
-    const int32_t drop = fx_mul_gain_q15_word(config->drop_gain, i_ref);
-    return fx_sat_q15_word(psi - reduction + drop);
+    return psi_magnet + fx_mulhi(weight_q31, 2 * (psi - psi_magnet));
 }
 
-current_target_t current_control_target(const current_control_config_t *config, dq_q15_t i_ref,
-                                        const flux_point_t *at_ref)
+/* f, Q30: the weighted flux, the resistive drop and a rotational voltage as flux errors. Q16 * Q31 = Q15. */
+static inline int32_t proportional_reference(int32_t weighted, q16_t drop_gain, int32_t i_ref, int32_t turned_q30)
 {
+    const int32_t with_drop = fx_sat_q15_word(weighted + fx_mulhi(drop_gain, i_ref * 65536));
+    return fx_sat_bits(with_drop * 32768 + turned_q30, 31);
+}
+
+/* (CC-25) */
+static inline void follow(rotating_flux_t *rotating, dq_q15_t to, int32_t psi_magnet)
+{
+    const dq_q15_t change = {to.d - rotating->psi.d, to.q - rotating->psi.q};
+    const int32_t largest = fx_max_s32(fx_abs_q31(change.d), fx_abs_q31(change.q));
+    const int32_t at_once = rotating->behind ? psi_magnet >> REACHED_SHIFT : psi_magnet - (psi_magnet >> 2);
+    int32_t quarters = 4;
+    if (largest > at_once) {
+        quarters = rotating->behind ? 3 : 2;
+    }
+    rotating->behind = quarters < 4;
+    rotating->psi = (dq_q15_halfword_t){fx_sat_q15(rotating->psi.d + ((change.d * quarters) >> 2)),
+                                        fx_sat_q15(rotating->psi.q + ((change.q * quarters) >> 2))};
+}
+
+FX_COLD current_target_t current_control_target(const current_control_config_t *config, const operating_point_t *at,
+                                                int32_t psi_d_error, rotating_flux_t *rotating)
+{
+    const fx_pair_t gains = pair_of(config->setpoint_weight, config->integral_gain);
+    const int32_t weight_q31 = (int32_t)(gains << 16);
+    const int32_t integral_gain = (int32_t)gains >> 16;
+    const q16_t drop_gain = config->drop_gain;
+    const int32_t weighted_d = weighted_flux(weight_q31, at->flux.psi_d, at->flux.psi_f0);
+    const int32_t weighted_q = weighted_flux(weight_q31, at->flux.psi_q, 0);
+    int32_t turn_q31 = at->omega >> 31;
+    int32_t rest = 0;
+    if (config->sigma_q24 != 0) { /* with current_control_turning.h only the sign of the speed acts */
+        turn_q31 = (at->omega >> 5) * MEASURED_SHARE_Q5;
+        rest = fx_sat_q15_word((at->omega - turn_q31) / (config->sigma_q24 >> 8)); /* Q31/Q16 */
+    }
+    follow(rotating, (dq_q15_t){weighted_d, weighted_q}, at->flux.psi_f0);
+    const int32_t with_magnet = fx_sat_q15_word(rotating->psi.d + psi_d_error);
     return (current_target_t){
-        .psi = {at_ref->psi_d, at_ref->psi_q},
-        .weighted = {weighted_reference(config, at_ref->psi_d, at_ref->psi_f0, i_ref.d) * 32768,
-                     weighted_reference(config, at_ref->psi_q, 0, i_ref.q) * 32768},
+        .psi = {(q15_t)at->flux.psi_d, (q15_t)at->flux.psi_q},
+        .weighted = {proportional_reference(weighted_d, drop_gain, at->i.d, -(rest * rotating->psi.q)),
+                     proportional_reference(weighted_q, drop_gain, at->i.q, rest * with_magnet)},
+        .turn = turn_q31 >> 16,
+        .integral_turn = (q15_t)((integral_gain * rest) >> 15),
+        .integral_gain = (q15_t)integral_gain,
     };
 }
 
@@ -41,11 +78,12 @@ static int32_t unlimited_voltage(int32_t sigma_q24, int32_t weighted_q30, int32_
     return fx_mulhi_add(s_and_ff_q30 >> 8, sigma_q24, weighted_q30 - psi * 32768);
 }
 
-/* s += sigma a_i e: Q15 * Q15 = Q30 with a gain below 1/2. |s| <= 1, so that the sum of s and the rotational voltage
- * fits Q30. */
-static int32_t integrate(int32_t s_q30, int32_t gain, int32_t error)
+/* s += a_i (sigma + j w') e: Q15 * Q15 = Q30 with gains below 1/2. |s| <= 1, so that the sum of s and the rotational
+ * voltage fits Q30. gains: of the turned error, of the error. */
+static void integrate(current_control_state_t *state, current_control_state_t s, fx_pair_t gains, fx_pair_t error)
 {
-    return fx_sat_bits(s_q30 + gain * error, 31);
+    state->s_d_q30 = fx_sat_bits(fx_difference2_cross_acc(s.s_d_q30, error, gains), 31);
+    state->s_q_q30 = fx_sat_bits(fx_dot2_acc(s.s_q_q30, error, gains), 31);
 }
 
 /* 1/(v_ratio v_dc), Q25 (CC-15), at most 64. Q31/Q15 = Q16. */
@@ -69,14 +107,14 @@ static int32_t remaining_voltage(int32_t other)
 /* While the d flux is to fall, the d axis has priority, and its excess is subtracted from q (CC-14). While the d flux
  * is to rise, the q axis has priority, because the q flux may be what limits the d axis; d keeps 0.7 of the circle, or
  * else the d flux would fall further and i_d would grow (CC-11). */
-static dq_q15_t limit_to_circle(dq_q15_t v, int32_t error_d, int32_t omega)
+static dq_q15_t limit_to_circle(dq_q15_t v, int32_t error_d, int32_t turn)
 {
     const dq_q15_t clipped = {fx_sat_q15_word(v.d), fx_sat_q15_word(v.q)};
     if (error_d > 0) {
         return (dq_q15_t){clamp_symmetric(clipped.d, fx_max_s32(remaining_voltage(clipped.q), V_D_MIN)), clipped.q};
     }
     const int32_t excess = fx_sat_q15_word(v.d - clipped.d);
-    const int32_t sign = omega >> 31; /* 0 or -1: with two's complement an excess of 0 changes nothing */
+    const int32_t sign = turn >> 31; /* 0 or -1: with two's complement an excess of 0 changes nothing */
     const int32_t reduced_q = v.q + (excess ^ sign) - sign;
     return (dq_q15_t){clipped.d, clamp_symmetric(reduced_q, remaining_voltage(clipped.d))};
 }
@@ -91,17 +129,15 @@ current_control_out_t current_control_step(const current_control_config_t *confi
                                            const current_control_in_t *in)
 {
     const dq_q15_t psi = {in->flux->psi_d, in->flux->psi_q};
-    const current_target_t to = *in->target;
+    const current_target_t *to = in->target;
     const fx_two_words_t integrators = FX_LOAD_TWO(state, s_d_q30, s_q_q30);
     const current_control_state_t s = {integrators.first, integrators.second};
-    const int32_t error_d = to.psi.d - psi.d;
-    const int32_t omega = fx_in_register(in->omega >> 16);
-    const int32_t psi_d = fx_sat_q15_word(psi.d + in->psi_d_error);
-    /* |s| <= 1 and |w psi| <= 1: at most 2^31 - 1. */
-    const dq_q22_t u_q22 = {unlimited_voltage(config->sigma_q24, to.weighted.d, psi.d, s.s_d_q30 - omega * psi.q),
-                            unlimited_voltage(config->sigma_q24, to.weighted.q, psi.q, s.s_q_q30 + omega * psi_d)};
-    const current_control_state_t next = {integrate(s.s_d_q30, config->integral_gain, error_d),
-                                          integrate(s.s_q_q30, config->integral_gain, to.psi.q - psi.q)};
+    const fx_pair_t error = fx_pair_sub(pair_of(to->psi.d, to->psi.q), fx_pair(psi.d, psi.q));
+    const int32_t turn = to->turn;
+    /* |s| <= 1 and |m w psi| <= 1: at most 2^31 - 1. */
+    const dq_q22_t u_q22 = {unlimited_voltage(config->sigma_q24, to->weighted.d, psi.d, s.s_d_q30 - turn * psi.q),
+                            unlimited_voltage(config->sigma_q24, to->weighted.q, psi.q, s.s_q_q30 + turn * psi.d)};
+    integrate(state, s, pair_of(to->integral_turn, to->integral_gain), error);
     const dq_q15_t u = {fx_sat_q15_word((u_q22.d + HALF_LSB_Q22) >> 7), fx_sat_q15_word((u_q22.q + HALF_LSB_Q22) >> 7)};
 
     const int32_t per_v_max_q25 = reciprocal_v_max(config, in->v_dc);
@@ -109,14 +145,13 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     const dq_q15_t v = {fx_mulhi(per_v_max_q25, u_q22.d), fx_mulhi(per_v_max_q25, u_q22.q)};
     const fx_pair_t v_pair = fx_pair(fx_sat_q15_word(v.d), fx_sat_q15_word(v.q));
     if (FX_USUALLY((uint32_t)fx_dot2(v_pair, v_pair) < config->clear_q30)) {
-        *state = next;
         return (current_control_out_t){.u = u, .v = v_pair, .clear = true};
     }
-    const dq_q15_t limited = limit_to_circle(v, error_d, omega);
+    const dq_q15_t limited = limit_to_circle(v, (int16_t)error, turn);
     const dq_q15_t change = {limited.d - v.d, limited.q - v.q};
     const int32_t gain_q33 = fx_mul_q31_word(config->tracking_gain_q34, in->v_dc); /* per unit of v: Q34 * Q15 */
-    *state = (current_control_state_t){anti_windup(next.s_d_q30, gain_q33, change.d),
-                                       anti_windup(next.s_q_q30, gain_q33, change.q)};
+    state->s_d_q30 = anti_windup(state->s_d_q30, gain_q33, change.d);
+    state->s_q_q30 = anti_windup(state->s_q_q30, gain_q33, change.q);
     return (current_control_out_t){
         .u = u,
         .v = fx_pair(limited.d, limited.q),

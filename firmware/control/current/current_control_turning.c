@@ -51,7 +51,7 @@ current_control_out_t turning_control_step(const turning_control_config_t *confi
 {
     const current_control_in_t *control = &in->control;
     const uint32_t half = (uint32_t)(in->angle_step >> 1);
-    const int32_t psi_d_error = control->psi_d_error * Q29_PER_Q15;
+    const int32_t psi_d_error = in->psi_d_error * Q29_PER_Q15;
     const dq_q29_t none = {0, 0};
     const dq_q29_t e = {state->now.d - control->flux->psi_d * Q29_PER_Q15,
                         state->now.q - control->flux->psi_q * Q29_PER_Q15};

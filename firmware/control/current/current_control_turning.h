@@ -15,8 +15,8 @@
  * Source   docs/theory/current-control.md (CC-16) ... (CC-20)
  * Units    per unit; angles in turns times 2^32
  * Range    0.36 < w_b T_s < 1.57; |r| <= 1, |u| <= 1, |s| w_b T_s < 2
- * Rounding half up: 1/2 LSB q15 in u and v; 2^-28 of a flux in s, 2^-25 in r. The voltage limit gets only the sign of
- *          w, which leaves up to 1 LSB q15 of its feed-forward -+w psi in u
+ * Rounding half up: 1/2 LSB q15 in u and v; 2^-28 of a flux in s, 2^-25 in r. The voltage limit gets the sign of w as
+ *          a turn of 0 or -1, which leaves up to 1 LSB q15 in u
  * Errors   saturates and reports it in limited; raises no fault
  * Context  fast ISR, in place of current_control_step(), which it calls */
 #include "control/current/current_control.h"
@@ -37,9 +37,10 @@ typedef struct {
 } turning_control_state_t;
 
 typedef struct {
-    current_control_in_t control; /* omega: 0 or -1, its sign */
+    current_control_in_t control;
     dq_q15_t i;
-    int32_t angle_step; /* theta */
+    int32_t angle_step;  /* theta */
+    int32_t psi_d_error; /* q15: identified flux minus the table's */
 } turning_control_in_t;
 
 static inline bool turning_control_used(const turning_control_config_t *config)

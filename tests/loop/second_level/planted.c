@@ -444,27 +444,28 @@ current_reference_t __wrap_current_reference_step(const current_reference_config
     return reference;
 }
 
-current_target_t __real_current_control_target(const current_control_config_t *config, dq_q15_t i_ref,
-                                               const flux_point_t *flux);
-current_target_t __wrap_current_control_target(const current_control_config_t *config, dq_q15_t i_ref,
-                                               const flux_point_t *flux);
-current_target_t __wrap_current_control_target(const current_control_config_t *config, dq_q15_t i_ref,
-                                               const flux_point_t *flux)
+current_target_t __real_current_control_target(const current_control_config_t *config, const operating_point_t *at,
+                                               int32_t psi_d_error, rotating_flux_t *rotating);
+current_target_t __wrap_current_control_target(const current_control_config_t *config, const operating_point_t *at,
+                                               int32_t psi_d_error, rotating_flux_t *rotating);
+current_target_t __wrap_current_control_target(const current_control_config_t *config, const operating_point_t *at,
+                                               int32_t psi_d_error, rotating_flux_t *rotating)
 {
     static dq_q15_t kept_i_ref;
+    const dq_q15_t i_ref = at->i;
+    operating_point_t there = *at;
     if (active == TARGET_125 || active == TARGET_SIGN || active == TARGET_OFFSET) {
-        const dq_q15_t wrong = (active == TARGET_125)    ? (dq_q15_t){i_ref.d * 5 / 4, i_ref.q * 5 / 4}
-                               : (active == TARGET_SIGN) ? (dq_q15_t){i_ref.d, -i_ref.q}
-                                                         : (dq_q15_t){i_ref.d, i_ref.q - 4000};
-        const flux_point_t there = flux_table_step(&under_test->ecu.motor.flux_table, wrong);
-        return __real_current_control_target(config, wrong, &there);
+        there.i = (active == TARGET_125)    ? (dq_q15_t){i_ref.d * 5 / 4, i_ref.q * 5 / 4}
+                  : (active == TARGET_SIGN) ? (dq_q15_t){i_ref.d, -i_ref.q}
+                                            : (dq_q15_t){i_ref.d, i_ref.q - 4000};
+    } else if (active == TARGET_STUCK) {
+        there.i = kept_i_ref;
+    } else {
+        kept_i_ref = i_ref;
+        return __real_current_control_target(config, at, psi_d_error, rotating);
     }
-    if (active == TARGET_STUCK) {
-        const flux_point_t there = flux_table_step(&under_test->ecu.motor.flux_table, kept_i_ref);
-        return __real_current_control_target(config, kept_i_ref, &there);
-    }
-    kept_i_ref = i_ref;
-    return __real_current_control_target(config, i_ref, flux);
+    there.flux = flux_table_step(&under_test->ecu.motor.flux_table, there.i);
+    return __real_current_control_target(config, &there, psi_delta, rotating);
 }
 
 rx_result_t __real_can_rx_frame(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame);

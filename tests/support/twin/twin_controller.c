@@ -102,6 +102,14 @@ static double slew_now(const twin_t *twin)
     return weak ? fmin(slew_max, m->torque_slew_weak_Nm) : slew_max;
 }
 
+/* Of the last step; the paper's identification takes no sums. */
+static twin_dq_t mean_voltage(const twin_t *twin)
+{
+    const twin_window_t *w = &twin->complete;
+    const double n = twin->motor.periods_per_step;
+    return (twin->robust && w->acting) ? (twin_dq_t){w->sum_u.d / n, w->sum_u.q / n} : twin->sample.u;
+}
+
 static void torque_path(twin_t *twin)
 {
     twin->torque_commanded = slew(twin->torque_commanded, limited_torque(twin), slew_now(twin));
@@ -113,7 +121,7 @@ static void torque_path(twin_t *twin)
         .limited = voltage_limited(twin) || twin->reference.limited,
     };
     const twin_reserve_in_t reserve = {
-        .u = twin->sample.u,
+        .u = mean_voltage(twin),
         .psi = twin->psi_ref,
         .v_dc = twin->v_dc,
         .psi_plan = twin->reference.psi_plan,
@@ -156,11 +164,13 @@ static void task(twin_t *twin)
     if (twin->run_state == TWIN_RUN) {
         torque_path(twin);
         twin->i_ref = twin->current_mode ? (twin_dq_t){twin->id_command, twin->iq_command} : twin->reference.i_ref;
-        twin->target = twin_current_target(&twin->motor, twin->i_ref);
+        twin->target = twin_current_target(&twin->motor, twin->i_ref, twin->sample.omega, twin->psi_delta,
+                                           &twin->rotating);
         next.i = twin->i_ref;
         next.flux = twin_flux_table(&twin->motor, next.i);
         twin->psi_ref = (twin_dq_t){next.flux.psi_d, next.flux.psi_q};
     } else {
+        twin->rotating = (twin_rotating_t){.psi = {twin->sample.flux.psi_d, twin->sample.flux.psi_q}};
         twin->torque_commanded = 0.0;
         twin->torque_state = (twin_torque_state_t){0};
         twin->reference = (twin_reference_t){.torque_max = twin->motor.torque_max_Nm, .psi_plan = HUGE_VAL};
@@ -200,12 +210,12 @@ static void collect(twin_t *twin, bool pulses_limited)
 static void bridge_on(twin_t *twin, const twin_angle_t *angle, double out[4])
 {
     const twin_mrai_in_t *now = &twin->sample;
-    const twin_current_in_t request = {twin->target, &now->flux, now->omega, twin->psi_delta, twin->v_dc};
+    const twin_current_in_t request = {twin->target, &now->flux, now->omega, twin->v_dc};
     motor_si_t motor = twin->motor;
     motor.dead_time_duty *= twin->compensation;
     if (motor.turning_feedback > 0.0) {
         motor.knee_A = fmax(motor.knee_A, motor.turning_knee_A_per_rad * fabs(angle->step));
-        const twin_turning_in_t far = {request, now->i, angle->step};
+        const twin_turning_in_t far = {request, now->i, angle->step, twin->psi_delta};
         twin->u = twin_turning_control(&motor, &twin->turning, &far);
     } else {
         twin->u = twin_current_control(&motor, &twin->current, &request);

@@ -35,15 +35,44 @@ static twin_dq_t circle(twin_dq_t u, double u_max, bool more_flux, double omega)
     return (twin_dq_t){u_max * limited.d, u_max * twin_clamp(q, -left, left)};
 }
 
-twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref)
+/* Of the rotational voltage, by the measured flux. */
+static const double measured_share = 11.0 / 32.0;
+
+static twin_dq_t sum(twin_dq_t a, double factor, twin_dq_t b)
+{
+    return (twin_dq_t){a.d + factor * b.d, a.q + factor * b.q};
+}
+
+static void follow(twin_rotating_t *r, twin_dq_t to, double psi_magnet)
+{
+    const twin_dq_t change = {to.d - r->psi.d, to.q - r->psi.q};
+    const double at_once = psi_magnet * (r->behind ? 1.0 / 16.0 : 0.75);
+    double share = 1.0;
+    if (fmax(fabs(change.d), fabs(change.q)) > at_once) {
+        share = r->behind ? 0.75 : 0.5;
+    }
+    r->behind = share < 1.0;
+    r->psi = sum(r->psi, share, change);
+}
+
+twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref, double omega, double psi_delta,
+                                  twin_rotating_t *rotating)
 {
     const twin_flux_t at = twin_flux_table(motor, i_ref);
     const double less = 1.0 - motor->setpoint_weight;
     const double drop = motor->r_ohm_20 / motor->sigma_rad_s;
+    const double rest = (1.0 - measured_share) * omega;
+    const double per_sigma = 1.0 / motor->sigma_rad_s;
+    const double d = at.psi_d - less * at.l_d * i_ref.d;
+    const double q = at.psi_q - less * at.l_q * i_ref.q;
+    follow(rotating, (twin_dq_t){d, q}, at.psi_d - at.l_d * i_ref.d);
+    const twin_dq_t r = rotating->psi;
     return (twin_target_t){
         .psi = {at.psi_d, at.psi_q},
-        .weighted = {at.psi_d - less * at.l_d * i_ref.d + drop * i_ref.d,
-                     at.psi_q - less * at.l_q * i_ref.q + drop * i_ref.q},
+        .weighted = {d + drop * i_ref.d - per_sigma * rest * r.q,
+                     q + drop * i_ref.q + per_sigma * (rest * r.d + omega * psi_delta)},
+        .turn = measured_share * omega,
+        .integral_turn = motor->integral_ratio * rest,
     };
 }
 
@@ -52,15 +81,15 @@ twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *st
     const twin_flux_t *f = in->flux;
     const twin_target_t *to = &in->target;
     const double sigma = motor->sigma_rad_s;
-    const double ud = sigma * (to->weighted.d - f->psi_d) + state->s.d - in->omega * f->psi_q;
-    const double uq = sigma * (to->weighted.q - f->psi_q) + state->s.q + in->omega * (f->psi_d + in->psi_delta);
+    const double ud = sigma * (to->weighted.d - f->psi_d) + state->s.d - to->turn * f->psi_q;
+    const double uq = sigma * (to->weighted.q - f->psi_q) + state->s.q + to->turn * f->psi_d;
     const twin_dq_t e = {to->psi.d - f->psi_d, to->psi.q - f->psi_q};
     const twin_dq_t u = circle((twin_dq_t){ud, uq}, motor->v_ratio * in->v_dc, e.d > 0.0, in->omega);
     const double rounding = 1e-9 * motor->v_base_V;
     state->limited = fabs(u.d - ud) > rounding || fabs(u.q - uq) > rounding;
     const double max = 4.0 * motor->v_ratio * in->v_dc;
-    state->s.d += integral(motor, e.d, twin_clamp(u.d - ud, -max, max));
-    state->s.q += integral(motor, e.q, twin_clamp(u.q - uq, -max, max));
+    state->s.d += integral(motor, e.d, twin_clamp(u.d - ud, -max, max)) - to->integral_turn * e.q;
+    state->s.q += integral(motor, e.q, twin_clamp(u.q - uq, -max, max)) + to->integral_turn * e.d;
     return u;
 }
 
@@ -68,11 +97,6 @@ void twin_turning_reset(twin_turning_state_t *state, const twin_flux_t *flux)
 {
     const twin_dq_t psi = {flux->psi_d, flux->psi_q};
     *state = (twin_turning_state_t){.now = psi, .next = psi};
-}
-
-static twin_dq_t sum(twin_dq_t a, double factor, twin_dq_t b)
-{
-    return (twin_dq_t){a.d + factor * b.d, a.q + factor * b.q};
 }
 
 /* x e^(j angle). */
@@ -92,7 +116,7 @@ twin_dq_t twin_turning_control(const motor_si_t *motor, twin_turning_state_t *st
 {
     const twin_current_in_t *c = &in->control;
     const double theta = in->step;
-    const twin_dq_t magnet = {c->psi_delta, 0.0};
+    const twin_dq_t magnet = {in->psi_delta, 0.0};
     const twin_dq_t e = {state->now.d - c->flux->psi_d, state->now.q - c->flux->psi_q};
     const twin_dq_t to = sum(state->next, motor->turning_approach, sum(c->target.psi, -1.0, state->next));
     const twin_dq_t model = between(sum(state->next, 1.0, magnet), sum(to, 1.0, magnet), theta);

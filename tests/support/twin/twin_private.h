@@ -50,6 +50,7 @@ struct twin {
     twin_mrai_in_t sample; /* its u acts during the present period */
     twin_dq_t i_ref, u, applied;
     twin_target_t target;
+    twin_rotating_t rotating;
     twin_reference_t reference;
     double trim;
     twin_limit_state_t limit;

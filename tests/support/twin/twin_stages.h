@@ -82,19 +82,27 @@ typedef struct {
     bool limited;
 } twin_current_state_t;
 
-/* The current reference as flux linkage: psi for the integral part; weighted, which includes set-point weight and
- * resistive drop, for the proportional part. */
+/* The current reference as flux linkage: psi for the integral part; weighted, which includes set-point weight,
+ * resistive drop and rotational voltage, for the proportional part. */
 typedef struct {
     twin_dq_t psi, weighted;
+    double turn, integral_turn; /* rad/s: of the measured flux, and of the integral part */
 } twin_target_t;
 
 typedef struct {
     twin_target_t target;
     const twin_flux_t *flux; /* at the measured current */
-    double omega, psi_delta, v_dc;
+    double omega, v_dc;
 } twin_current_in_t;
 
-twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref);
+/* r: flux whose rotational voltage the target makes. Before the first target it is the measured flux. */
+typedef struct {
+    twin_dq_t psi;
+    bool behind;
+} twin_rotating_t;
+
+twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref, double omega, double psi_delta,
+                                  twin_rotating_t *rotating);
 
 twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *state, const twin_current_in_t *in);
 
@@ -109,6 +117,7 @@ typedef struct {
     twin_current_in_t control;
     twin_dq_t i;
     double step; /* advance of the angle, rad per period */
+    double psi_delta;
 } twin_turning_in_t;
 
 /* The law of a motor whose field turns far in a period. */

@@ -5,21 +5,28 @@ import math
 
 import numpy as np
 import pytest
-from conftest import MOTORS
+from conftest import MOTORS, ROOT
 
 from fluxtrue_tools.motor.config import ANGLE_PER_PERIOD_MAX, ANGLE_TURNING
-from fluxtrue_tools.motor.current_loop import SIGMA, CurrentLoop, current_loop, turning, usual
+from fluxtrue_tools.motor.current_loop import INTEGRAL, SIGMA, CurrentLoop, current_loop, turning, usual
 from fluxtrue_tools.motor.derived import (
+    CLOSED_LOOP_SHARE,
     LOOP_MISSING_PERIODS,
+    MEASURED_SHARE,
     TURNING_APPROACH,
     TURNING_FEEDBACK,
     TURNING_INTEGRAL,
     frozen_settle_s,
 )
 from fluxtrue_tools.motor.emit_c import knee_turns_q27
+from fluxtrue_tools.motor.loop_report import PHASE_MARGIN_MIN_DEG, lowest_margins, model_lines
 from fluxtrue_tools.motor.motor import load_motor
 
-PHASE_MARGIN_MIN_DEG = 40.0
+INVENTED = ROOT / "tests" / "motors"
+SLOPES = (1 / 1.25, 1.0, 1 / 0.75)  # tables over machine: inductances of 125, 100 and 75 % of the data
+LOSSES = (0.0, 0.02, 0.1)  # decay of the flux on the resistance per period
+DRIVES = {folder.name: folder for folder in (*sorted(MOTORS.iterdir()), *sorted(INVENTED.iterdir()))
+          if (folder / "motor.toml").exists()}  # fmt: skip
 TURNING_RPM = 0.5 * 10000.0 * 60 / (2 * math.pi * 4)  # half a radian per period with four pole pairs at 10 kHz
 # As in the document: phase margins of both, largest sensitivity, largest table slope over the true one.
 TABLE = {0.0: (52, 57, 1.50, 3.5), 0.2: (30, 48, 1.57, 3.3), 0.4: (17, 44, 1.63, 3.2), 0.6: (9, 48, 1.63, 3.1),
@@ -42,7 +49,7 @@ def test_inductances_wrong_by_half_in_either_direction_keep_the_loop_stable() ->
 @pytest.mark.parametrize("theta", TABLE)
 def test_the_documents_table(theta: float) -> None:
     before, margin, sensitivity, slope = TABLE[theta]
-    law = usual(theta)
+    law = usual(theta, share=1.0)
     if before is None:
         assert law.largest_pole() > 1.0
     else:
@@ -51,9 +58,80 @@ def test_the_documents_table(theta: float) -> None:
     assert turning(theta, slope).largest_pole() < 1.0 < turning(theta, slope + 0.15).largest_pole()
 
 
-def test_the_usual_law_ends_before_its_margins_do() -> None:
-    assert usual(ANGLE_TURNING).margins()[0] > 19.0
-    assert usual(0.8).largest_pole() < 1.0 < usual(0.9).largest_pole()
+@pytest.mark.parametrize("slope", SLOPES)
+def test_either_law_keeps_40_degrees_where_it_is_used_with_inductances_25_percent_off(slope: float) -> None:
+    """At every speed and for every machine: the resistance alone differs between machines."""
+    for law, last in ((usual, ANGLE_TURNING), (turning, ANGLE_PER_PERIOD_MAX)):
+        for theta in np.arange(0.0, last + 0.005, 0.01 if law is usual else 0.05):
+            for loss in LOSSES:
+                for direction in (-1.0, 1.0):
+                    loop = law(direction * theta, slope=slope, loss=loss)
+                    assert loop.margins(4001)[0] >= PHASE_MARGIN_MIN_DEG, (law.__name__, theta, loss)
+                    assert loop.largest_pole() < 0.97, (law.__name__, theta, loss)
+
+
+@pytest.mark.parametrize("name", DRIVES)
+def test_every_machine_keeps_40_degrees_over_speed_and_inductance(name: str) -> None:
+    found = lowest_margins(load_motor(DRIVES[name]))
+    assert found is not None
+    print(f"{name}: {found}")
+    assert found.phase_deg >= PHASE_MARGIN_MIN_DEG
+    assert found.gain_dB >= 4.5
+
+
+def test_the_report_names_the_lowest_margin() -> None:
+    assert model_lines(load_motor(MOTORS / "hsm1"))[-1] == (
+        "  lowest             43° (10000 rpm, L -25 %), 6.2 dB, over speed, L ±25 % and all four quadrants; "
+        "40° are demanded"
+    )
+
+
+# As in the document, all of the rotational voltage by the measured flux and the law's share of it: phase margins with
+# the data's inductances and with 25 % less; overshoot, and movement of the other axis, with 20 % less, in %.
+FALL = {0.0: ((52, 45, 4.6, 0.0), (52, 45, 4.6, 0.0)), 0.1: ((40, 33, 4.9, 10.4), (51, 45, 5.2, 6.7)),
+        0.2: ((30, 22, 8.2, 20.6), (49, 43, 7.1, 13.1)), 0.314: ((21, 12, 18.8, 35.7), (47, 42, 11.1, 19.4)),
+        0.35: ((19, 9, 22.4, 41.6), (46, 41, 12.3, 21.1))}  # fmt: skip
+
+
+def usual_step(theta: float, share: float, slope: float) -> tuple[float, float]:
+    """Of a step of psi_q within one period by section 3: overshoot and largest change of psi_d, in %."""
+    rest = (1.0 - share) * theta
+    weight = CLOSED_LOOP_SHARE if share < 1.0 else 1.0
+    psi = acts = s = 0.0j
+    moved = []
+    for _ in range(150):
+        seen = slope * psi
+        u = SIGMA * (CLOSED_LOOP_SHARE * 1j - seen) + s + 1j * (share * theta * seen + rest * weight * 1j)
+        s += INTEGRAL * (SIGMA + 1j * rest) * (1j - seen)
+        psi, acts = np.exp(-1j * theta) * psi + np.exp(-0.5j * theta) * acts, u
+        moved.append(slope * psi)
+    return 100 * max(x.imag for x in moved) - 100, 100 * max(abs(x.real) for x in moved)
+
+
+@pytest.mark.parametrize("theta", FALL)
+def test_the_documents_table_of_the_usual_law(theta: float) -> None:
+    for share, (margin, smaller, overshoot_percent, moved) in zip((1.0, MEASURED_SHARE), FALL[theta], strict=True):
+        assert usual(theta, share).margins()[0] == pytest.approx(margin, abs=0.6)
+        assert usual(theta, share, slope=1 / 0.75).margins()[0] == pytest.approx(smaller, abs=0.6)
+        assert usual_step(theta, share, 1.25) == (pytest.approx(overshoot_percent, abs=0.1),
+                                                  pytest.approx(moved, abs=0.1))  # fmt: skip
+    assert usual(theta).largest_pole() == pytest.approx(0.9355, abs=0.001)
+    assert usual_step(theta, MEASURED_SHARE, 1.0)[0] < 0.2
+
+
+def test_no_gain_keeps_the_margin_while_all_of_the_feed_forward_follows_the_measured_flux() -> None:
+    """Gain scheduling alone: at 0.314 rad and with 25 % less inductance."""
+    laws = [usual(0.314, 1.0, sigma=sigma, slope=1 / 0.75) for sigma in np.arange(0.02, 0.6, 0.02)]
+    assert max(law.margins(2001)[0] for law in laws if law.largest_pole() < 1.0) == pytest.approx(12.0, abs=0.2)
+
+
+def test_the_firmware_has_the_share_of_the_model() -> None:
+    source = (ROOT / "firmware" / "control" / "current" / "current_control.c").read_text(encoding="utf-8")
+    assert f"#define MEASURED_SHARE_Q5 {32 * MEASURED_SHARE:g} " in source
+
+
+def test_with_all_of_the_feed_forward_from_the_measured_flux_the_loop_would_end_before_one_radian() -> None:
+    assert usual(0.8, share=1.0).largest_pole() < 1.0 < usual(0.9, share=1.0).largest_pole()
 
 
 def test_no_share_of_the_feed_forward_and_no_advance_replace_the_other_law() -> None:
@@ -61,7 +139,7 @@ def test_no_share_of_the_feed_forward_and_no_advance_replace_the_other_law() -> 
         for advance in np.arange(-1.5, 1.01, 0.25):
             for sigma in (SIGMA, 0.28, 0.22):
                 laws = [usual(theta, share, advance, sigma) for theta in (0.0, 0.4, 0.8, 1.2)]
-                assert min(law.margins(2001)[0] if law.largest_pole() < 1.0 else 0.0 for law in laws) < 30.0
+                assert min(law.margins(2001)[0] if law.largest_pole() < 1.0 else 0.0 for law in laws) < 35.0
 
 
 def test_a_motor_has_the_law_that_its_firmware_has() -> None:

@@ -24,7 +24,9 @@ void setUp(void)
     current_control_reset(&state);
     flux = flux_table_step(&f.flux_table, (dq_q15_t){-4000, 6000});
     const dq_q15_t psi = {flux.psi_d, flux.psi_q};
-    target = (current_target_t){psi, q30(psi)}; /* no flux error */
+    /* No flux error, no rotation. */
+    target = (current_target_t){.psi = {(q15_t)psi.d, (q15_t)psi.q}, .weighted = q30(psi)};
+    target.integral_gain = f.current_control.integral_gain;
     in = (current_control_in_t){.target = &target, .flux = &flux, .v_dc = 21845 /* 350 V */};
 }
 
@@ -58,6 +60,24 @@ static dq_q15_t step(void)
     return out.u;
 }
 
+static dq_q15_t words(dq_q15_halfword_t x)
+{
+    return (dq_q15_t){x.d, x.q};
+}
+
+static dq_q15_halfword_t halfwords(dq_q15_t x)
+{
+    return (dq_q15_halfword_t){(q15_t)x.d, (q15_t)x.q};
+}
+
+/* omega: q15. */
+static current_target_t target_at(dq_q15_t i, const flux_point_t *at, int omega, int psi_d_error)
+{
+    const operating_point_t point = {.i = i, .flux = *at, .omega = (q31_t)((uint32_t)omega << 16)};
+    rotating_flux_t reached = {.psi = {(q15_t)at->psi_d, (q15_t)at->psi_q}};
+    return current_control_target(&f.current_control, &point, psi_d_error, &reached);
+}
+
 static twin_dq_t si_psi(dq_q15_t psi)
 {
     return (twin_dq_t){from_q15(psi.d) * f.psi, from_q15(psi.q) * f.psi};
@@ -69,10 +89,10 @@ static twin_dq_t twin_step(twin_current_state_t *twin)
     const twin_dq_t psi = si_psi((dq_q15_t){flux.psi_d, flux.psi_q});
     const twin_flux_t si = {.psi_d = psi.d, .psi_q = psi.q};
     const dq_q15_t weighted = {target.weighted.d / 32768, target.weighted.q / 32768};
-    const twin_current_in_t t = {{si_psi(target.psi), si_psi(weighted)},
+    const double integral_w = f.si.integral_ratio * f.si.sigma_rad_s * target.integral_turn / target.integral_gain;
+    const twin_current_in_t t = {{si_psi(words(target.psi)), si_psi(weighted), target.turn / 32768.0 * f.w, integral_w},
                                  &si,
-                                 from_q31(in.omega) * f.w,
-                                 from_q15(in.psi_d_error) * f.psi,
+                                 (double)target.turn,
                                  from_q15(in.v_dc) * f.v};
     const twin_dq_t u = twin_current_control(&f.si, twin, &t);
     return (twin_dq_t){u.d / f.v * 32768.0, u.q / f.v * 32768.0};
@@ -85,23 +105,34 @@ static dq_q15_t random_dq(uint64_t *seed, int largest)
 
 /* --- the target ------------------------------------------------------------------------------ */
 
-/* psi* has the error of the tables (4 LSB, see test_flux_table.c); the weighted one adds two roundings and (1 - b) of
- * that error. */
+/* psi* has the error of the tables (4 LSB, see test_flux_table.c); the weighted one adds three roundings and (1 - b) of
+ * that error. A reference that saturates is not compared. */
 void test_the_target_of_every_reference_follows_the_twin(void)
 {
     worst_t worst = {0};
+    uint64_t seed = 50;
     for (int d = -32768; d <= 0; d += 311) {
         for (int q = -32768; q <= 32767; q += 313) {
             const dq_q15_t i = {(q15_t)d, (q15_t)q};
             const flux_point_t at = flux_table_step(&f.flux_table, i);
-            const current_target_t y = current_control_target(&f.current_control, i, &at);
-            const twin_target_t t = twin_current_target(&f.si, (twin_dq_t){from_q15(d) * f.i, from_q15(q) * f.i});
+            const q15_t w = (q15_t)random_in(&seed, -32767, 32767);
+            const q15_t delta = (q15_t)random_in(&seed, -3000, 3000);
+            const current_target_t y = target_at(i, &at, w, delta * 32 / 21);
+            const twin_dq_t si = {from_q15(d) * f.i, from_q15(q) * f.i};
+            const twin_flux_t table = twin_flux_table(&f.si, si);
+            twin_rotating_t reached = {.psi = {table.psi_d, table.psi_q}};
+            const twin_target_t t = twin_current_target(&f.si, si, from_q15(w) * f.w, from_q15(delta) * f.psi,
+                                                        &reached);
             const double lsb = 32768.0 / f.psi;
             worst_note(&worst, y.psi.d - t.psi.d * lsb, "psi_d of %d %d", d, q);
             worst_note(&worst, y.psi.q - twin_clamp(t.psi.q * lsb, -32768, 32767), "psi_q of %d %d", d, q);
-            worst_note(&worst, y.weighted.d / 32768.0 - t.weighted.d * lsb, "f_d of %d %d", d, q);
-            if (fabs(t.psi.q * lsb) < 32760.0) {
-                worst_note(&worst, y.weighted.q / 32768.0 - t.weighted.q * lsb, "f_q of %d %d", d, q);
+            worst_note(&worst, y.turn - t.turn / f.w * 32768.0, "m w of %d", w);
+            worst_note(&worst, y.integral_turn - t.integral_turn / f.w * 32768.0, "a_i w' of %d", w);
+            if (fabs(t.psi.q * lsb) < 32760.0 && fabs(t.weighted.d * lsb) < 32760.0) {
+                worst_note(&worst, y.weighted.d / 32768.0 - t.weighted.d * lsb, "f_d of %d %d %d", d, q, w);
+            }
+            if (fabs(t.psi.q * lsb) < 32760.0 && fabs(t.weighted.q * lsb) < 32760.0) {
+                worst_note(&worst, y.weighted.q / 32768.0 - t.weighted.q * lsb, "f_q of %d %d %d", d, q, w);
             }
         }
     }
@@ -111,7 +142,7 @@ void test_the_target_of_every_reference_follows_the_twin(void)
 void test_the_target_of_zero_current_is_the_magnets_flux(void)
 {
     const flux_point_t at = flux_table_step(&f.flux_table, (dq_q15_t){0, 0});
-    const current_target_t y = current_control_target(&f.current_control, (dq_q15_t){0, 0}, &at);
+    const current_target_t y = target_at((dq_q15_t){0, 0}, &at, 0, 0);
     TEST_ASSERT_EQUAL_INT(f.flux_table.psi_f0[0], y.psi.d);
     TEST_ASSERT_EQUAL_INT(f.flux_table.psi_f0[0] * 32768, y.weighted.d);
     TEST_ASSERT_EQUAL_INT(0, y.psi.q);
@@ -125,7 +156,7 @@ void test_the_set_point_weight_reduces_only_the_flux_of_the_current(void)
     const flux_point_t at = {.psi_d = 10000, .psi_q = 8000, .psi_f0 = 17000};
     f.current_control.setpoint_weight = 16384;
     f.current_control.drop_gain = 8192;
-    const current_target_t y = current_control_target(&f.current_control, (dq_q15_t){-4000, 2000}, &at);
+    const current_target_t y = target_at((dq_q15_t){-4000, 2000}, &at, 0, 0);
     TEST_ASSERT_EQUAL_INT((10000 + 3500 - 500) * 32768, y.weighted.d);
     TEST_ASSERT_EQUAL_INT((8000 - 4000 + 250) * 32768, y.weighted.q);
     TEST_ASSERT_EQUAL_INT(10000, y.psi.d);
@@ -141,7 +172,97 @@ static bool between_steps(double v)
     return fabs(v) < 1.0 && fabs(cells - round(cells)) < 0.05;
 }
 
-/* |psi* - psi| and psi_d + dpsi stay below 1, above which the stage saturates them.
+/* By hand: w = 1/2 and sigma/omega_b = 0.8488. Of u_q = w (psi_d + dpsi) = 5500 the measured flux makes
+ * 11/32 w 10000 = 1719; f_q has the rest over sigma, and so has f_d that of u_d = -3000. psi_d_error is
+ * 32/21 1000. */
+void test_the_target_contains_what_the_measured_flux_does_not_make_of_the_rotational_voltage(void)
+{
+    f.current_control.setpoint_weight = INT16_MAX;
+    f.current_control.drop_gain = 0;
+    const flux_point_t at = {.psi_d = 10000, .psi_q = 6000, .psi_f0 = 10000};
+    for (int sign = -1; sign <= 1; sign += 2) {
+        const current_target_t y = target_at((dq_q15_t){0, 0}, &at, sign * 16384, 1524);
+        TEST_ASSERT_INT_WITHIN(1, sign * 5632, y.turn);
+        TEST_ASSERT_INT_WITHIN(2, 10000 - sign * (3000 - 1031) / 0.8488, y.weighted.d / 32768);
+        TEST_ASSERT_INT_WITHIN(2, 6000 + sign * (5500 - 1719) / 0.8488, y.weighted.q / 32768);
+        TEST_ASSERT_INT_WITHIN(1,
+                               sign * 0.5 * 21.0 / 32.0 * 32768.0 / 0.8488 * from_q15(f.current_control.integral_gain),
+                               y.integral_turn);
+    }
+}
+
+/* By hand: of a change of 15000, more than 3/4 of the magnet's 16000, one half is made, then 3/4 of the rest each time
+ * until 1/16 of the magnet's flux is left. f_d is 16000 - 0.5 * 21/32 r_q/0.8488. */
+void test_a_large_change_of_the_target_is_followed_as_the_machines_flux_follows_it(void)
+{
+    static const int32_t expected[] = {7500, 13125, 14531, 15000, 15000};
+    f.current_control.setpoint_weight = INT16_MAX;
+    f.current_control.drop_gain = 0;
+    const operating_point_t to = {.flux = {.psi_d = 16000, .psi_q = 15000, .psi_f0 = 16000}, .omega = 1 << 30};
+    for (int d = 0; d <= 1; d++) { /* either axis may be what is large */
+        rotating_flux_t rotating = {.psi = {(q15_t)(d ? 1000 : 16000), (q15_t)(d ? 15000 : 0)}};
+        for (unsigned k = 0; k < sizeof expected / sizeof *expected; k++) {
+            const current_target_t y = current_control_target(&f.current_control, &to, 0, &rotating);
+            const int32_t made = d ? rotating.psi.d - 1000 : rotating.psi.q;
+            TEST_ASSERT_INT_WITHIN(1, expected[k], made);
+            TEST_ASSERT_EQUAL(k < 3, rotating.behind);
+            TEST_ASSERT_EQUAL_INT(15000, y.psi.q);
+            TEST_ASSERT_INT_WITHIN(2, 16000 - 0.5 * 21.0 / 32.0 * rotating.psi.q / 0.8488, y.weighted.d / 32768);
+            TEST_ASSERT_INT_WITHIN(2, 15000 + 0.5 * 21.0 / 32.0 * rotating.psi.d / 0.8488, y.weighted.q / 32768);
+        }
+    }
+}
+
+void test_a_small_change_of_the_target_is_made_at_once(void)
+{
+    operating_point_t to = {.flux = {.psi_d = 16000, .psi_f0 = 16000}};
+    f.current_control.setpoint_weight = INT16_MAX;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        rotating_flux_t rotating = {.psi = {16000, 0}};
+        to.flux.psi_q = sign * 12000; /* 3/4 of the magnet's flux */
+        (void)current_control_target(&f.current_control, &to, 0, &rotating);
+        TEST_ASSERT_FALSE(rotating.behind);
+        TEST_ASSERT_INT_WITHIN(1, sign * 12000, rotating.psi.q);
+    }
+}
+
+/* Jumps between points whose flux the tables hold, up to the limit of current. */
+void test_the_followed_flux_is_that_of_the_twin(void)
+{
+    uint64_t seed = 58;
+    rotating_flux_t rotating = {.psi = {f.flux_table.psi_f0[0], 0}};
+    twin_rotating_t twin = {.psi = {from_q15(rotating.psi.d) * f.psi, 0.0}};
+    dq_q15_t i = {0, 0};
+    int behind = 0;
+    for (int n = 0; n < 20000; n++) {
+        if (random_in(&seed, 0, 3) == 0) {
+            i = (dq_q15_t){random_in(&seed, -20000, 0), random_in(&seed, -10000, 10000)};
+        }
+        const operating_point_t to = {.i = i, .flux = flux_table_step(&f.flux_table, i)};
+        (void)current_control_target(&f.current_control, &to, 0, &rotating);
+        (void)twin_current_target(&f.si, (twin_dq_t){from_q15(i.d) * f.i, from_q15(i.q) * f.i}, 0.0, 0.0, &twin);
+        behind += rotating.behind ? 1 : 0;
+        if (rotating.behind != twin.behind) { /* a bound lies within the error of the tables */
+            twin = (twin_rotating_t){si_psi(words(rotating.psi)), rotating.behind};
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(6.0, twin.psi.d / f.psi * 32768.0, rotating.psi.d);
+        TEST_ASSERT_DOUBLE_WITHIN(6.0, twin.psi.q / f.psi * 32768.0, rotating.psi.q);
+    }
+    TEST_ASSERT_GREATER_THAN_INT(2000, behind);
+}
+
+/* current_control_turning.h has a rotational voltage of its own. */
+void test_without_proportional_part_nothing_turns(void)
+{
+    f.current_control.sigma_q24 = 0;
+    const flux_point_t at = {.psi_d = 10000, .psi_q = 6000, .psi_f0 = 10000};
+    const current_target_t y = target_at((dq_q15_t){0, 0}, &at, -16384, 1524);
+    TEST_ASSERT_EQUAL_INT(-1, y.turn);
+    TEST_ASSERT_EQUAL_INT(0, y.integral_turn);
+    TEST_ASSERT_EQUAL_INT32(10000 * 32768, y.weighted.d);
+}
+
+/* |psi* - psi| stays below 1, above which the stage saturates it.
  * Errors of v: 0.5 LSB of the product, relative 1e-5 of the quotient, 0.5 LSB at the end of the saturation; those of d
  * also enter q. */
 void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
@@ -155,9 +276,11 @@ void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
         const dq_q15_t psi = random_dq(&seed, largest);
         flux.psi_d = psi.d;
         flux.psi_q = psi.q;
-        target = (current_target_t){random_dq(&seed, largest), q30(random_dq(&seed, largest))};
-        in.omega = random_in(&seed, -32767, 32767) * 65536;
-        in.psi_d_error = (q15_t)random_in(&seed, -3000, 3000);
+        target = (current_target_t){.psi = halfwords(random_dq(&seed, largest)),
+                                    .weighted = q30(random_dq(&seed, largest)),
+                                    .turn = random_in(&seed, -32767, 32767),
+                                    .integral_gain = f.current_control.integral_gain,
+                                    .integral_turn = (q15_t)random_in(&seed, -1100, 1100)};
         in.v_dc = (q15_t)random_in(&seed, 900, 32767);
         state = (current_control_state_t){random_in(&seed, -450000000, 450000000),
                                           random_in(&seed, -450000000, 450000000)};
@@ -168,9 +291,9 @@ void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
             continue;
         }
         limited_steps += twin.limited ? 1 : 0;
-        worst_note(&worst, u.d - t.d, "u_d %d, psi %d %d w %d v %d", u.d, psi.d, psi.q, in.omega, in.v_dc);
+        worst_note(&worst, u.d - t.d, "u_d %d, psi %d %d w %d v %d", u.d, psi.d, psi.q, target.turn, in.v_dc);
         worst_note(&worst, u.q - t.q, "u_q %d not %.1f (u_d %d), psi %d %d w %d v %d", u.q, t.q, u.d, psi.d, psi.q,
-                   in.omega, in.v_dc);
+                   target.turn, in.v_dc);
         worst_note(&integrator, 2.0 * from_q31(state.s_d_q30) - twin.s.d / f.v, "s_d, psi %d %d", psi.d, psi.q);
         worst_note(&integrator, 2.0 * from_q31(state.s_q_q30) - twin.s.q / f.v, "s_q, psi %d %d", psi.d, psi.q);
     }
@@ -187,8 +310,9 @@ void test_after_ten_thousand_periods_the_integrators_equal_those_of_the_twin(voi
     twin_current_state_t twin = {0};
     in.v_dc = 32767;
     for (int n = 0; n < 10000; n++) {
-        target.psi = (dq_q15_t){(q15_t)(flux.psi_d + random_in(&seed, -300, 300)),
-                                (q15_t)(flux.psi_q + random_in(&seed, -300, 300))};
+        target.psi = (dq_q15_halfword_t){(q15_t)(flux.psi_d + random_in(&seed, -300, 300)),
+                                         (q15_t)(flux.psi_q + random_in(&seed, -300, 300))};
+        target.integral_turn = (q15_t)random_in(&seed, -1100, 1100);
         (void)step();
         (void)twin_step(&twin);
         worst_note(&worst, 2.0 * from_q31(state.s_d_q30) - twin.s.d / f.v, "s_d of period %d", n);
@@ -202,10 +326,10 @@ void test_after_ten_thousand_periods_the_integrators_equal_those_of_the_twin(voi
  * LSB. */
 void test_a_million_periods_of_one_lsb_ripple_do_not_bias_the_integrators(void)
 {
-    const dq_q15_t initial = target.psi;
+    const dq_q15_halfword_t initial = target.psi;
     for (int n = 0; n < 1000000; n++) {
         const int e = (n & 1) ? 1 : -1;
-        target.psi = (dq_q15_t){(q15_t)(initial.d + e), (q15_t)(initial.q + e)};
+        target.psi = (dq_q15_halfword_t){(q15_t)(initial.d + e), (q15_t)(initial.q + e)};
         (void)step();
     }
     TEST_ASSERT_EQUAL_INT32(0, state.s_d_q30);
@@ -233,22 +357,33 @@ void test_at_standstill_without_error_the_voltage_is_that_of_the_integrators(voi
     TEST_ASSERT_EQUAL_INT32(1000 * 32768, state.s_d_q30);
 }
 
-/* By hand: u_d = -w psi_q, u_q = w (psi_d + dpsi) with w = 1/2. */
-void test_the_rotational_voltages_are_fed_forward_with_the_identified_flux(void)
+/* By hand: u_d = -m w psi_q, u_q = m w psi_d with m w = 1/2. */
+void test_a_share_of_the_rotational_voltage_follows_the_measured_flux(void)
 {
-    in.omega = 16384 * 65536;
-    in.psi_d_error = 1000;
+    target.turn = 16384;
     in.v_dc = 32767;
     flux.psi_d = target.psi.d = 10000;
     flux.psi_q = target.psi.q = 6000;
-    target.weighted = q30(target.psi);
+    target.weighted = q30(words(target.psi));
     dq_q15_t u = step();
     TEST_ASSERT_INT_WITHIN(1, -3000, u.d);
-    TEST_ASSERT_INT_WITHIN(1, 5500, u.q);
-    in.omega = -16384 * 65536;
+    TEST_ASSERT_INT_WITHIN(1, 5000, u.q);
+    target.turn = -16384;
     u = step();
     TEST_ASSERT_INT_WITHIN(1, 3000, u.d);
-    TEST_ASSERT_INT_WITHIN(1, -5500, u.q);
+    TEST_ASSERT_INT_WITHIN(1, -5000, u.q);
+}
+
+/* By hand: s_d -= a_i w' e_q and s_q += a_i w' e_d, beside what a_i sigma integrates of the axis's own error. */
+void test_the_integral_part_integrates_along_the_voltage_that_holds_a_deviation(void)
+{
+    target.integral_gain = 1000;
+    target.integral_turn = 300;
+    target.psi.d = (q15_t)(flux.psi_d + 100);
+    target.psi.q = (q15_t)(flux.psi_q - 40);
+    (void)step();
+    TEST_ASSERT_EQUAL_INT32(1000 * 100 + 300 * 40, state.s_d_q30);
+    TEST_ASSERT_EQUAL_INT32(1000 * -40 + 300 * 100, state.s_q_q30);
 }
 
 /* sigma/omega_b = 1/(3 T_s omega_b) = 0.8488; the proportional part follows f, the integral part psi*. */
@@ -286,7 +421,7 @@ void test_the_d_axis_has_priority_and_the_q_axis_gets_the_rest_of_the_circle(voi
 void test_the_excess_of_the_d_voltage_is_subtracted_from_the_q_voltage_in_the_direction_of_rotation(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
-        in.omega = sign; /* too small for a rotational voltage: only its sign acts */
+        target.turn = sign; /* too small for a rotational voltage: only its sign acts */
         state = (current_control_state_t){.s_d_q30 = -(int32_t)(v_max() + 200.0) * 32768};
         const dq_q15_t u = step();
         TEST_ASSERT_INT_WITHIN(1, -v_max(), u.d);
@@ -320,7 +455,7 @@ void test_inside_the_circle_nothing_is_limited_in_either_direction_of_rotation(v
         const double length = random_in(&seed, 880, 985) * 1e-3 * v_max();
         state = (current_control_state_t){(int32_t)(length * cos(phi)) * 32768, (int32_t)(length * sin(phi)) * 32768};
         const current_control_state_t before = state;
-        in.omega = (n & 1) ? -1 : 1;
+        target.turn = (n & 1) ? -1 : 1;
         (void)step();
         TEST_ASSERT_FALSE(limited);
         TEST_ASSERT_EQUAL_INT32(before.s_d_q30, state.s_d_q30);
@@ -354,10 +489,9 @@ void test_from_every_flux_at_the_voltage_limit_the_target_is_reached(void)
         double psi_q = psi_max * sin(phi);
         twin_dq_t acting = {-w * psi_q, w * psi_d};
         current_control_reset(&state);
-        target.psi = (dq_q15_t){(q15_t)lround(magnet.psi_d / f.psi * 32768.0), 0};
-        target.weighted = q30(target.psi);
-        in.omega = (q31_t)lround(w / f.w * 2147483648.0);
-        in.psi_d_error = 0;
+        target.psi = (dq_q15_halfword_t){(q15_t)lround(magnet.psi_d / f.psi * 32768.0), 0};
+        const flux_point_t at = {.psi_d = target.psi.d, .psi_q = 0, .psi_f0 = target.psi.d};
+        target = target_at((dq_q15_t){0, 0}, &at, (int)lround(w / f.w * 32768.0), 0);
         for (int k = 0; k < 400; k++) { /* 40 ms, one period of delay */
             flux.psi_d = (q15_t)lround(psi_d / f.psi * 32768.0);
             flux.psi_q = (q15_t)lround(psi_q / f.psi * 32768.0);
@@ -385,7 +519,7 @@ void test_a_voltage_inside_the_circle_is_not_reported_as_limited(void)
     TEST_ASSERT_INT_WITHIN(1, v_max(), step().q);
     TEST_ASSERT_TRUE(limited);
     for (int sign = -1; sign <= 1; sign++) { /* d is inside the circle: nothing is subtracted from q in any direction */
-        in.omega = sign;
+        target.turn = sign;
         state = (current_control_state_t){.s_d_q30 = (int32_t)(0.98 * v_max()) * 32768};
         TEST_ASSERT_INT_WITHIN(1, 0, step().q);
         TEST_ASSERT_FALSE(limited);
@@ -414,8 +548,8 @@ void test_the_integrator_settles_at_the_limit_and_leaves_it_immediately(void)
 {
     in.v_dc = 4000;
     const int32_t initial = target.psi.q;
-    target.psi.q = initial + 200;
-    target.weighted = q30(target.psi);
+    target.psi.q = (q15_t)(initial + 200);
+    target.weighted = q30(words(target.psi));
     for (int n = 0; n < 5000; n++) {
         (void)step();
     }
@@ -426,8 +560,8 @@ void test_the_integrator_settles_at_the_limit_and_leaves_it_immediately(void)
     TEST_ASSERT_TRUE(limited);
     TEST_ASSERT_INT_WITHIN(32768, settled, state.s_q_q30);
     TEST_ASSERT_INT_WITHIN(2, v_max() + 0.8488 * 200 * (0.7 - 1.0), settled >> 15);
-    target.psi.q = initial - 200;
-    target.weighted = q30(target.psi);
+    target.psi.q = (q15_t)(initial - 200);
+    target.weighted = q30(words(target.psi));
     TEST_ASSERT_LESS_THAN_INT((int)v_max(), step().q);
     TEST_ASSERT_LESS_THAN_INT32(settled, state.s_q_q30);
 }
@@ -486,10 +620,10 @@ void test_the_worst_corner_of_every_input_neither_wraps_nor_leaves_the_circle(vo
         const q15_t end[2] = {INT16_MAX, INT16_MIN};
         flux.psi_d = end[n & 1];
         flux.psi_q = end[(n >> 1) & 1];
-        target.psi = (dq_q15_t){end[(n >> 2) & 1], end[(n >> 3) & 1]};
+        target.psi = (dq_q15_halfword_t){end[(n >> 2) & 1], end[(n >> 3) & 1]};
         target.weighted = q30((dq_q15_t){end[(n >> 4) & 1], end[(n >> 5) & 1]});
-        in.omega = ((n >> 6) & 1) ? INT32_MIN : INT32_MAX;
-        in.psi_d_error = end[(n >> 7) & 1];
+        target.turn = end[(n >> 6) & 1] / 32 * 11;
+        target.integral_turn = (q15_t)(((n >> 7) & 1) ? 1100 : -1100);
         state.s_d_q30 = state.s_q_q30 = (n & 256) ? -(1 << 30) : (1 << 30) - 1;
         in.v_dc = (n & 1) ? 32767 : 900;
         const dq_q15_t u = step(); /* at most |v_q| = 1 and the 0.7 that the d axis always keeps */

@@ -60,7 +60,7 @@ void tearDown(void)
 static void turn_by(double theta)
 {
     in.angle_step = (int32_t)lround(theta / two_pi * 4294967296.0);
-    in.control.omega = (theta < 0.0) ? -1 : 0;
+    target.turn = (theta < 0.0) ? -1 : 0;
 }
 
 static double complex of_q29(dq_q29_t x)
@@ -104,13 +104,11 @@ static double complex number(twin_dq_t x)
 static double complex twin_step(twin_turning_state_t *twin, double theta)
 {
     const twin_flux_t psi = {.psi_d = from_q15(flux.psi_d), .psi_q = from_q15(flux.psi_q)};
-    const twin_turning_in_t x = {{{{from_q15(target.psi.d), from_q15(target.psi.q)}, {0.0, 0.0}},
-                                  &psi,
-                                  theta / turn,
-                                  from_q15(in.control.psi_d_error),
-                                  from_q15(in.control.v_dc)},
-                                 {from_q15(in.i.d), from_q15(in.i.q)},
-                                 theta};
+    const twin_turning_in_t x = {
+        {{.psi = {from_q15(target.psi.d), from_q15(target.psi.q)}}, &psi, theta / turn, from_q15(in.control.v_dc)},
+        {from_q15(in.i.d), from_q15(in.i.q)},
+        theta,
+        from_q15(in.psi_d_error)};
     *twin = (twin_turning_state_t){
         .s = pair(of_q28(state.s) / turn), .now = pair(of_q29(state.now)), .next = pair(of_q29(state.next))};
     return number(twin_turning_control(&si, twin, &x));
@@ -127,9 +125,10 @@ static void randomise(uint64_t *seed, int32_t largest)
     state = (turning_control_state_t){
         .s = {s.d / 2, s.q / 2}, .now = random_flux(seed, largest), .next = random_flux(seed, largest)};
     flux = (flux_point_t){.psi_d = random_in(seed, -largest, largest), .psi_q = random_in(seed, -largest, largest)};
-    target.psi = (dq_q15_t){random_in(seed, -largest, largest), random_in(seed, -largest, largest)};
+    target.psi = (dq_q15_halfword_t){(q15_t)random_in(seed, -largest, largest),
+                                     (q15_t)random_in(seed, -largest, largest)};
     in.i = (dq_q15_t){random_in(seed, -20000, 20000), random_in(seed, -20000, 20000)};
-    in.control.psi_d_error = (q15_t)random_in(seed, -3000, 3000);
+    in.psi_d_error = (q15_t)random_in(seed, -3000, 3000);
 }
 
 /* Near a boundary of the circle's 256 steps, stage and twin may use different ones. */
@@ -178,7 +177,7 @@ void test_the_model_starts_from_the_machines_flux_and_its_voltage_is_the_rotatio
     state.s.d = 1000;
     turning_control_reset(&state, &flux);
     TEST_ASSERT_EQUAL_INT32(0, state.s.d);
-    target.psi = (dq_q15_t){12000, -5000};
+    target.psi = (dq_q15_halfword_t){12000, -5000};
     turn_by(1.0);
     step();
     const double complex psi = from_q15(12000) + I * from_q15(-5000);
@@ -218,7 +217,7 @@ void test_a_step_reaches_the_machine_without_overshoot_or_cross_coupling_at_ever
     for (unsigned k = 0; k < sizeof angles / sizeof *angles; k++) {
         machine_t machine = machine_at(0.3, 1.0);
         machine.acts = 2.0 * I * sin(0.5 * angles[k]) / turn * machine.psi;
-        target.psi = (dq_q15_t){9830, 0};
+        target.psi = (dq_q15_halfword_t){9830, 0};
         run(&machine, angles[k], 30);
         target.psi.q = 3000;
         double largest_q = 0.0, smallest_d = 1.0;
@@ -240,7 +239,7 @@ void test_tables_at_half_and_at_twice_the_true_slope_are_stable_at_every_speed(v
         for (double slope = 0.5; slope < 2.1; slope *= 2.0) {
             machine_t machine = machine_at(0.2, slope);
             machine.acts = 2.0 * I * sin(0.5 * theta) / turn * machine.psi;
-            target.psi = (dq_q15_t){6554, 1000};
+            target.psi = (dq_q15_halfword_t){6554, 1000};
             run(&machine, theta, 400);
             TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.0, cabs(machine.psi - (6554.0 + 1000.0 * I) / 32768.0));
         }
@@ -253,9 +252,9 @@ void test_at_the_voltage_limit_the_model_goes_as_far_as_the_voltage_reaches(void
     machine_t machine = machine_at(0.3, 1.0);
     const double theta = 0.6;
     machine.acts = 2.0 * I * sin(0.5 * theta) / turn * machine.psi;
-    target.psi = (dq_q15_t){9830, 0};
+    target.psi = (dq_q15_halfword_t){9830, 0};
     run(&machine, theta, 20);
-    target.psi = (dq_q15_t){9830, 14000};
+    target.psi = (dq_q15_halfword_t){9830, 14000};
     in.control.v_dc = 11400; /* a circle of 0.209: the rotational voltage of the target needs 0.206 */
     int limited = 0;
     for (int n = 0; n < 12; n++) {
@@ -282,9 +281,9 @@ void test_extreme_inputs_stay_within_their_limits(void)
     uint64_t seed = 92;
     for (int n = 0; n < 20000; n++) {
         flux = (flux_point_t){.psi_d = corner[random_in(&seed, 0, 2)], .psi_q = corner[random_in(&seed, 0, 2)]};
-        target.psi = (dq_q15_t){corner[random_in(&seed, 0, 2)], corner[random_in(&seed, 0, 2)]};
+        target.psi = (dq_q15_halfword_t){(q15_t)corner[random_in(&seed, 0, 2)], (q15_t)corner[random_in(&seed, 0, 2)]};
         in.i = (dq_q15_t){corner[random_in(&seed, 0, 2)], corner[random_in(&seed, 0, 2)]};
-        in.control.psi_d_error = (q15_t)corner[random_in(&seed, 0, 2)];
+        in.psi_d_error = (q15_t)corner[random_in(&seed, 0, 2)];
         in.control.v_dc = random_in(&seed, 0, 1) ? 32767 : random_in(&seed, 0, 2000);
         in.angle_step = (int32_t)random_u32(&seed);
         step();

@@ -182,6 +182,8 @@ static void dual(const q15_t v[4], int32_t acc)
     const long double crossed_difference = ((long double)v[0] * v[3]) - ((long double)v[1] * v[2]);
     expect_equal("fx_difference2_cross_acc", v[0], v[1], fx_difference2_cross_acc(acc, a, b),
                  wrapped(acc + crossed_difference));
+    expect_equal("fx_pair_sub", v[0], v[1], (int64_t)fx_pair_sub(a, b),
+                 (int64_t)fx_pair(fx_sat_q15_word(v[0] - v[2]), fx_sat_q15_word(v[1] - v[3])));
     const int32_t one_by_one = fx_mac_q30(fx_mac_q30(acc, v[0], v[2]), v[1], v[3]);
     expect_equal("fx_mac_q30", v[0], v[1], one_by_one, wrapped(acc + dot));
 }

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "fx/q.h"
+#include "fx/vec.h"
 #include "safety/launch_power.h"
 
 #include <math.h>
@@ -16,7 +18,7 @@ static const launch_power_config_t config = {
 static launch_power_state_t state;
 static launch_power_in_t in;
 
-enum { SETTLED = 10, CONFIRMED = 5 };
+enum { SETTLED = 10, EARLY = 16, CONFIRMED = 5 };
 
 /* The rotor behind the samples: l_d = 0.65, l_q = 1.6, its angle measured by delta too large. */
 static struct {
@@ -159,6 +161,30 @@ void test_noise_of_the_current_sensors_is_no_fault_and_hides_nothing_when_it_end
     TEST_ASSERT_EQUAL_INT(3 + CONFIRMED - 1, found_after_change(1060));
 }
 
+/* As with a wrong angle: the currents oscillate about their reference until the rotor turns. Of an oscillation of twice
+ * the threshold m_0 keeps less than half of what a mean over four steps does. */
+void test_an_oscillation_that_ends_does_not_hide_a_change_of_twice_the_threshold(void)
+{
+    in.i_ref = (dq_q15_t){0, 13107};
+    in.psi_ref = (dq_q15_t){14418, 20971};
+    for (int n = 0; n < 4 + SETTLED + EARLY; n++) {
+        in.u_standing.q = (n & 1) ? 1060 : -1060;
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    }
+    TEST_ASSERT_GREATER_THAN_INT32(120 * 256, state.noise_q8);
+    TEST_ASSERT_LESS_THAN_INT32(120 * 256, state.first_noise_q8);
+    in.u_standing.q = 0;
+    for (int n = 0; n < 60; n++) {
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    }
+    int found = 0;
+    in.u_standing.q = 1060;
+    for (int n = 1; n <= 30 && found == 0; n++) {
+        found = (launch_power_step(&config, &state, &in) != 0U) ? n : 0;
+    }
+    TEST_ASSERT_GREATER_THAN_INT(CONFIRMED, found);
+}
+
 /* r_0 follows the noise upwards, too: by 1 - exp(-1/2) of it in 2048 steps. */
 void test_the_reference_of_the_noise_follows_it_in_4096_steps(void)
 {
@@ -294,10 +320,19 @@ typedef struct {
     int steady, wrong;
 } twin_t;
 
-static void follow(double *mean, double *first, double x, int steady)
+/* With much noise, m_0 is a mean over 8 steps at first. Near the bound, rounding decides as in the code. */
+static double first_steps(const twin_t *t, double i)
 {
-    *mean += (x - *mean) / ((steady < 4) ? 1.0 : 4.0);
-    *first = (steady < SETTLED) ? *mean : *first + (*mean - *first) / 4096.0;
+    const double beyond = 2.0 * t->r - 530.0 * i / 65536.0;
+    const int32_t loss_max = fx_mulhi(530, fx_magnitude(state.i_ref.d, state.i_ref.q) * 65536);
+    const double of_code = 2 * (state.noise_q8 >> 8) - loss_max;
+    return (t->steady < SETTLED + EARLY && ((fabs(beyond) > 20.0) ? beyond : of_code) > 0.0) ? 8.0 : 4096.0;
+}
+
+static void follow(const twin_t *t, double *mean, double *first, double x, double steps)
+{
+    *mean += (x - *mean) / ((t->steady < 4) ? 1.0 : 4.0);
+    *first = (t->steady < SETTLED) ? *mean : *first + (*mean - *first) / steps;
 }
 
 /* (MN-39) */
@@ -310,7 +345,8 @@ static void follow_noise(twin_t *t, double p, double i)
     const double x = (above != t->above) ? fmin(fabs(p - t->p), 8.0 * 530.0 * i / 65536.0) : 0.0;
     t->above = above;
     t->r += (x - t->r) / ((t->steady < SETTLED) ? 4.0 : 16.0);
-    t->r_0 = (t->steady < SETTLED) ? t->r : t->r_0 + (t->r - t->r_0) / 4096.0;
+    const double steps = first_steps(t, i);
+    t->r_0 = (t->steady < SETTLED) ? t->r : t->r_0 + (t->r / ((steps < 10.0) ? 2.0 : 1.0) - t->r_0) / steps;
 }
 
 /* Returns by how much the power has changed beyond its threshold; negative while nothing is compared. */
@@ -328,16 +364,14 @@ static double twin_step(twin_t *t)
         t->steady = 0;
     }
     follow_noise(t, p, hypot(i_d, i_q));
-    follow(&t->p, &t->p_0, p, t->steady);
-    follow(&t->w, &t->w_0, w, t->steady);
+    const double steps = first_steps(t, hypot(i_d, i_q));
+    follow(t, &t->p, &t->p_0, p, steps);
+    follow(t, &t->w, &t->w_0, w, steps);
     const double v_turning = 2.0 * fabs(t->w - t->w_0) * (2884.0 + abs(in.psi_ref.q) / 8.0) / 65536.0;
-    const double loss_max = fmax(530.0 * hypot(i_d, i_q) / 65536.0, 2.0 * fmax(t->r, t->r_0));
+    const double loss_max = fmax(530.0 * hypot(i_d, i_q) / 65536.0, sqrt(2.0) * hypot(t->r, t->r_0));
     const double beyond = fabs(t->p - t->p_0) - loss_max - v_turning * hypot(i_d, i_q) / 65536.0;
-    if (t->steady < SETTLED) {
-        t->steady++;
-        return -100.0;
-    }
-    return beyond;
+    t->steady += (t->steady < SETTLED + EARLY) ? 1 : 0;
+    return (t->steady <= SETTLED) ? -100.0 : beyond;
 }
 
 static int32_t uniform(int32_t lo, int32_t hi)

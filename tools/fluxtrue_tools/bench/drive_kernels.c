@@ -153,7 +153,8 @@ CALLED void drive_copy(void)
     found.phases = (abc_q15_t){((int32_t)port.counts.i_a - 2048) * 16, ((int32_t)port.counts.i_b - 2048) * 16,
                                ((int32_t)port.counts.i_c - 2048) * 16};
     found.theta_e = sample_box_at(&copy.samples, copy.samples.generation)->theta_e;
-    found.core = (current_target_t){found.i, {found.i.d * 32768, found.i.q * 32768}};
+    found.core = (current_target_t){.psi = {(q15_t)found.i.d, (q15_t)found.i.q},
+                                    .weighted = {found.i.d * 32768, found.i.q * 32768}};
 }
 
 CALLED uint32_t drive_limited(void)
@@ -184,12 +185,12 @@ CALLED const int32_t *drive_outputs(void)
         (int32_t)fast->faults,
         mrai->e_d_q27,
         mrai->e_q_q27,
-        mrai->psi_delta,
+        mrai->psi_d_error,
         mrai->r_delta,
         drive.mrai.isr.torque.sum_q24,
         drive.mrai.task.torque_mean.mean,
         drive.task.identification.torque_estimated,
-        drive.task.identification.psi_delta,
+        drive.task.identification.psi_d_error,
         drive.task.identify.kalman.p_q30[0],
         drive.task.identify.kept.local.q,
     };
@@ -281,8 +282,6 @@ static inline __attribute__((always_inline)) void tick(drive_t *d, bool looks_up
     const current_control_in_t control = {
         .target = found.target,
         .flux = looks_up ? &here : &flux,
-        .omega = angle.omega_q31,
-        .psi_d_error = d->psi_d_error,
         .v_dc = measured.v_dc,
     };
     const current_control_out_t wanted = current_control_step(&d->parameters.current_control, &d->fast.current_control,
@@ -346,8 +345,6 @@ STAGE void bench_current_control(void)
     const current_control_in_t control = {
         .target = found.target,
         .flux = &flux,
-        .omega = found.sample->omega,
-        .psi_d_error = d->psi_d_error,
         .v_dc = sample_box_at(&d->samples, d->samples.generation)->v_dc,
     };
     found.wanted = current_control_step(&d->parameters.current_control, &d->fast.current_control, &control);

@@ -192,11 +192,12 @@ CALLED void task_reference(void)
 CALLED void task_target(void)
 {
     drive_t *d = the_copy();
-    operating_point_t next;
+    operating_point_t next = snapshot.sample.point;
     next.i = d->task.reference.i_ref;
     next.flux = flux_table_step(&d->motor->flux_table, next.i);
     command_t command = {.run = true};
-    command.target = current_control_target(&d->parameters.current_control, next.i, &next.flux);
+    command.target = current_control_target(&d->parameters.current_control, &next, 32 * snapshot.psi_d_error / 21,
+                                            &d->task.rotating);
     command_box_write(&d->commands, command);
 }
 

@@ -18,7 +18,7 @@ FULL_SCALE_PER_I_MAX = 1.35  # leaves 5 % between i_max and the trip for noise a
 SLEW_PER_TORQUE_MAX = 100.0  # 1/s
 THERMAL_SPAN_MIN_K = 5.0
 ANGLE_PER_PERIOD_MAX = 1.2  # rad: five samples per turn of the field; beyond it the formats of angle and speed end
-ANGLE_TURNING = 0.35  # rad: from here on current_control_turning.c, whose phase margin is 44 degrees and more
+ANGLE_TURNING = 0.35  # rad: from here on current_control_turning.c; below, either law keeps 40 degrees
 
 
 class Machine(Strict):

@@ -7,13 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fluxtrue_tools.motor.derived import CLOSED_LOOP_SHARE, DELAY_PERIODS, TURNING_FEEDBACK, TURNING_INTEGRAL
+from fluxtrue_tools.motor.derived import (
+    CLOSED_LOOP_SHARE,
+    DELAY_PERIODS,
+    MEASURED_SHARE,
+    TURNING_FEEDBACK,
+    TURNING_INTEGRAL,
+)
 from fluxtrue_tools.motor.envelope import available_flux
 from fluxtrue_tools.motor.flux_model import Array
 from fluxtrue_tools.motor.motor import Motor
 
 SIGMA = 1.0 / (2.0 * DELAY_PERIODS)  # per period
-INTEGRAL = CLOSED_LOOP_SHARE * (1.0 - CLOSED_LOOP_SHARE) * SIGMA
+INTEGRAL = CLOSED_LOOP_SHARE * (1.0 - CLOSED_LOOP_SHARE) * SIGMA  # a_i
 POINT_FLUX, POINT_TORQUE = 0.85, 0.25  # shares of the available ones
 POINT_CURRENT = 0.95  # of i_max_A, at most
 POINTS = 400
@@ -56,15 +62,19 @@ class CurrentLoop:
 
 def usual(
     theta: float,
-    share: float = 1.0,
+    share: float = MEASURED_SHARE,
     advance: float = 0.0,
     sigma: float = SIGMA,
     slope: float = 1.0,
     loss: float = 0.0,
 ) -> CurrentLoop:
-    """Section 3, with a share of the feed-forward and an additional advance of the angle."""
+    """Section 3: of the rotational voltage a share follows the measured flux, the rest the target (CC-24).
+
+    With a share of 1 (CC-12). advance: additional one of the angle.
+    """
     turn = np.exp(1j * (advance - 0.5) * theta)
-    return CurrentLoop(theta, turn * (sigma - 1j * share * theta), turn * sigma * INTEGRAL, slope, loss)
+    integral = INTEGRAL * (sigma + 1j * (1.0 - share) * theta)
+    return CurrentLoop(theta, turn * (sigma - 1j * share * theta), turn * integral, slope, loss)
 
 
 def turning(theta: float, slope: float = 1.0, loss: float = 0.0) -> CurrentLoop:

@@ -23,18 +23,21 @@ Complex = NDArray[np.complex128]
 PERIODS, SETTLE = 4096, 1024
 LINES = 24  # of each direction
 LOW, HIGH = 0.004, 0.45  # of the PWM frequency
-VOLTAGE = 0.01  # amplitude of all lines together, rms, of vdc
+VOLTAGE = 0.02  # amplitude of all lines together, rms, of vdc
 START_S = 0.4
 WATCHED = ("voltage_limited", "fault_word")
 
 
-def at_point(simulated: Simulated, motor: Motor, speed_rpm: float, inductance: float) -> DataLoop:
+def at_point(
+    simulated: Simulated, motor: Motor, speed_rpm: float, inductance: float, torque_sign: float = 1.0
+) -> DataLoop:
     """The drive at the operating point of the plots, as current references, settled.
 
     At standstill phase a carries all of the current: none of the three is near zero, where the dead time acts. The
     monitors that compare voltages with currents would take the source in series for a fault.
     """
-    i_d, i_q = operating_point(motor, speed_rpm, inductance)
+    i_d, i_q = operating_point(motor, abs(speed_rpm), inductance)
+    i_q *= torque_sign
     angle = -math.atan2(i_q, i_d) / motor.config.machine.pole_pairs
     wrong = {"lq_scale": inductance, "ld_slope_scale": inductance, "theta_m_rad": angle % (2.0 * math.pi)}
     loop = simulated.loop({"imposed_speed": 1.0} | wrong)
@@ -60,7 +63,7 @@ def lines(turns: int) -> NDArray[np.int64]:
     for sign, odd in ((1, 1), (-1, 0)):
         for line in wanted:
             k = 2 * round((line - odd) / 2) + odd
-            while turns and k % (6 * turns) == 0:
+            while turns and k % (6 * abs(turns)) == 0:
                 k += 2
             found.append(sign * k)
     return np.unique(np.array(found, dtype=np.int64))
@@ -75,12 +78,14 @@ def excitation(at: NDArray[np.int64], amplitude_V: float) -> Complex:
     return np.asarray(np.fft.ifft(spectrum))
 
 
-def measure(simulated: Simulated, motor: Motor, speed_rpm: float, inductance: float = 1.0) -> Response:
+def measure(
+    simulated: Simulated, motor: Motor, speed_rpm: float, inductance: float = 1.0, torque_sign: float = 1.0
+) -> Response:
     """The open loop with so many times the inductances of the data."""
     theta = turn_per_period(motor, speed_rpm)
     turns = round(theta * PERIODS / (2.0 * math.pi))
     per_rpm = PERIODS * turn_per_period(motor, 1.0) / (2.0 * math.pi)
-    with at_point(simulated, motor, turns / per_rpm, inductance) as loop:
+    with at_point(simulated, motor, turns / per_rpm, inductance, torque_sign) as loop:
         at = lines(turns)
         source = excitation(at, VOLTAGE * motor.config.inverter.vdc_V)
         loop.record(("truth.u_d_V", "truth.u_q_V", *WATCHED))

@@ -2,6 +2,7 @@
 """The report's lines on the current loop: margins of the model, and what has been measured in simulation."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from fluxtrue_tools.motor.current_loop import current_loop, model_response
 from fluxtrue_tools.motor.current_steps import AXES, STEP, Step
@@ -10,6 +11,8 @@ from fluxtrue_tools.motor.measured import LOOP_INDUCTANCES, LOOP_SPEEDS, STEP_IN
 from fluxtrue_tools.motor.motor import Motor
 
 Lines = list[str]
+PHASE_MARGIN_MIN_DEG = 40.0  # what each machine keeps, with either law
+MARGIN_SPEEDS = tuple(k / 8.0 for k in range(9))  # of the top speed
 
 
 def speed_named(motor: Motor, share: float) -> str:
@@ -28,6 +31,43 @@ def model_margins(motor: Motor, share: float, inductance: float) -> Margins | No
     if current_loop(motor, speed_rpm, inductance).largest_pole() >= 1.0:
         return None
     return margins(model_response(motor, speed_rpm, inductance))
+
+
+@dataclass(frozen=True)
+class Lowest:
+    """The lowest margins of the model, and where the phase margin is lowest."""
+
+    phase_deg: float
+    gain_dB: float
+    share: float
+    inductance: float
+
+
+def lowest_margins(motor: Motor) -> Lowest | None:
+    """Over speed and the inductances' error; None: somewhere the loop is unstable.
+
+    The four quadrants are alike: the sign of i_q changes no inductance, and with the other sign of speed the model is
+    its own mirror image, whose margins are the same.
+    """
+    found = []
+    for share in MARGIN_SPEEDS:
+        for inductance in LOOP_INDUCTANCES:
+            margin = model_margins(motor, share, inductance)
+            if margin is None:
+                return None
+            found.append((margin.phase_deg, margin.gain_dB, share, inductance))
+    phase_deg, _, share, inductance = min(found)
+    return Lowest(phase_deg, min(gain_dB for _, gain_dB, _, _ in found), share, inductance)
+
+
+def lowest_named(motor: Motor) -> str:
+    """The line of the report."""
+    found = lowest_margins(motor)
+    if found is None:
+        return "unstable"
+    where = f"{speed_named(motor, found.share)}, {inductance_named(found.inductance)}"
+    return (f"{found.phase_deg:.0f}° ({where}), {found.gain_dB:.1f} dB, over speed, L ±25 % and all four quadrants; "
+            f"{PHASE_MARGIN_MIN_DEG:g}° are demanded")  # fmt: skip
 
 
 def margins_named(found: Margins | None) -> str:
@@ -54,7 +94,8 @@ def law_of(motor: Motor) -> str:
 def model_lines(motor: Motor) -> Lines:
     """The lines of report.txt that need no simulation."""
     head = f"current loop: phase and gain margin of {law_of(motor)}, sampled linear model"
-    return [head, *_margin_lines(motor, lambda share, inductance: model_margins(motor, share, inductance))]
+    each = _margin_lines(motor, lambda share, inductance: model_margins(motor, share, inductance))
+    return [head, *each, f"  {'lowest':<18} {lowest_named(motor)}"]
 
 
 def overshoot_named(step: Step) -> str:
