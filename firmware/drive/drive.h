@@ -84,7 +84,9 @@ typedef enum {
 typedef struct {
     short_circuit_side_t side;
     bool holds;    /* the short circuit is on, as read back */
+    bool is_found; /* the side has been changed because of a switch that does not switch on */
     uint8_t waits; /* periods with switching disabled that come before it, (SS-21) */
+    open_switch_state_t open_switch;
 } short_circuit_t;
 
 /** Written by the fast ISR alone (drive_raise_fault() is called from its priority). */

@@ -40,10 +40,10 @@ static void reset_control(drive_t *drive, sample_t *sample)
 }
 
 /* The safe state: all switches of one side on (short circuit), or switching disabled (freewheel). */
-static void apply_safe_state(drive_t *drive, sample_t *sample, const command_t *command)
+static void apply_safe_state(drive_t *drive, sample_t *sample, const command_t *command, int32_t angle_step)
 {
     if (!short_circuit_waits(&drive->fast) && short_circuit_is_needed(drive->fast.faults, command->safe)) {
-        short_circuit_apply(&drive->fast, command->upper);
+        short_circuit_step(drive, sample, command->upper, angle_step);
     } else {
         short_circuit_end(&drive->fast);
     }
@@ -211,7 +211,7 @@ static FX_NOT_INLINED FX_COLD void run_period_checked(drive_t *drive, sample_t *
         if (command->faults != 0U) {
             drive_raise_fault(drive, command->faults);
         }
-        apply_safe_state(drive, sample, command);
+        apply_safe_state(drive, sample, command, angle_step);
     }
     fast->is_settled = !turning && fast->periods_since_enable >= PERIODS_TO_ACT && fast->monitor.pending == 0U;
     publish_sample(drive, sample);

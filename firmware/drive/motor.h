@@ -26,6 +26,7 @@
 #include "safety/gate_fault.h"
 #include "safety/launch_power.h"
 #include "safety/monitor.h"
+#include "safety/open_switch.h"
 #include "safety/plausibility.h"
 #include "safety/safe_state.h"
 #include "safety/short_side.h"

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/short_circuit.h"
 
+#include "control/current/measure.h"
+#include "control/current/transform.h"
 #include "hal/pwm.h"
 #include "types/faults.h"
 
@@ -17,15 +19,42 @@ static short_circuit_side_t side_after(short_circuit_side_t side)
     return (side == SHORT_CIRCUIT_UPPER) ? SHORT_CIRCUIT_LAST_LOWER : SHORT_CIRCUIT_NONE;
 }
 
-void short_circuit_apply(fast_state_t *fast, bool upper)
+/* With a gate fault the sides are tried instead: a shorted switch does not make the short circuit incomplete. */
+static open_switch_t find_open_switch(fast_state_t *fast, const short_circuit_in_t *in)
+{
+    short_circuit_t *state = &fast->short_circuit;
+    if (!state->holds || (fast->faults & FAULT_GATE) != 0U) {
+        state->open_switch = (open_switch_state_t){0};
+        return OPEN_SWITCH_NONE;
+    }
+    const open_switch_in_t open_switch = {in->i, in->psi, in->angle_step, state->side == SHORT_CIRCUIT_UPPER};
+    return open_switch_step(&in->open_switch, &state->open_switch, &open_switch);
+}
+
+static short_circuit_side_t without_open_switch(fast_state_t *fast, const short_circuit_in_t *in)
+{
+    short_circuit_t *state = &fast->short_circuit;
+    const open_switch_t found = find_open_switch(fast, in);
+    if (found == (state->side == SHORT_CIRCUIT_UPPER ? OPEN_SWITCH_UPPER : OPEN_SWITCH_LOWER)) {
+        state->open_switch = (open_switch_state_t){0};
+        state->is_found = true;
+        return (found == OPEN_SWITCH_UPPER) ? SHORT_CIRCUIT_LOWER : SHORT_CIRCUIT_UPPER;
+    }
+    if (state->is_found) {
+        return state->side;
+    }
+    return in->upper ? SHORT_CIRCUIT_UPPER : SHORT_CIRCUIT_LOWER;
+}
+
+void short_circuit_apply(fast_state_t *fast, const short_circuit_in_t *in)
 {
     short_circuit_t *state = &fast->short_circuit;
     if (state->holds && !hal_pwm_gates()) {
         state->side = side_after(state->side);
-    } else if (upper && state->side == SHORT_CIRCUIT_LOWER) {
-        state->side = SHORT_CIRCUIT_UPPER;
+    } else if (state->side <= SHORT_CIRCUIT_UPPER) {
+        state->side = without_open_switch(fast, in);
     } else {
-        /* as before */
+        /* the only side that is left */
     }
     if (state->side == SHORT_CIRCUIT_NONE) {
         short_circuit_end(fast);
@@ -38,6 +67,22 @@ void short_circuit_apply(fast_state_t *fast, bool upper)
     state->holds = hal_pwm_gates();
 }
 
+void short_circuit_step(drive_t *drive, const sample_t *sample, bool upper, int32_t angle_step)
+{
+    const motor_t *m = drive->motor;
+    const flux_point_t *flux = &sample->point.flux;
+    const dq_q15_t psi = {fx_sat_q15(flux->psi_d + drive->psi_d_error), fx_sat_q15(flux->psi_q)};
+    const ab_q30_t psi_q30 = inverse_park_q30(psi, fx_rotation(sample->theta_e));
+    const short_circuit_in_t in = {
+        .upper = upper,
+        .open_switch = {m->plausibility.i_dead, m->current_reference.i_max, (q15_t)(m->safe_state.psi_f / 2)},
+        .i = measure_phases(sample->i_ab, sample->zero_q28),
+        .psi = {transform_round(psi_q30.alpha), transform_round(psi_q30.beta)},
+        .angle_step = angle_step,
+    };
+    short_circuit_apply(&drive->fast, &in);
+}
+
 void short_circuit_end(fast_state_t *fast)
 {
     fast->short_circuit.holds = false;
@@ -48,6 +93,7 @@ void short_circuit_end(fast_state_t *fast)
 void short_circuit_prepare(fast_state_t *fast, uint32_t periods)
 {
     fast->short_circuit.holds = false;
+    fast->short_circuit.is_found = false;
     fast->short_circuit.waits = (uint8_t)periods;
 }
 

@@ -149,26 +149,38 @@ static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool ac
     return launch_power_step(&drive->motor->launch_power, &task->launch_power, &in);
 }
 
-/* The second harmonic of a half wave turns by almost a whole number of turns in a step, or hardly at all: it would look
- * constant. */
+/* The second harmonic of a half wave turns by almost a whole number of turns in half a step, or hardly at all: it would
+ * look constant. */
 static bool is_second_harmonic_constant(uint64_t turns_q60)
 {
-    const uint64_t part = (2U * turns_q60 + (1ULL << 55)) & ((1ULL << 60) - 1U);
+    const uint64_t part = (turns_q60 + (1ULL << 55)) & ((1ULL << 60) - 1U);
     return part < 1ULL << 56; /* within 1/32 of a turn */
 }
 
-/* Finds no fault: it decides by which side a short circuit would be made if a fault occurred now. While a fault is
- * latched or the short circuit is on, the decision of the last step before it is kept: switching is disabled first. */
-static void update_short_side(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
+static void count_in_short_side(drive_t *drive, const snapshot_t *snapshot, const sample_t *sample, abc_q15_t i_ref)
 {
-    const sample_t *sample = &snapshot->sample;
+    const uint64_t turns_q60 = turns_of_step_q60(drive, snapshot->sample.point.omega);
     const short_side_in_t in = {
-        .acting = sample->acting && !is_second_harmonic_constant(turns_of_step_q60(drive, sample->point.omega)),
+        .acting = sample->acting && !is_second_harmonic_constant(turns_q60),
         .shorted = snapshot->shorted || snapshot->faults != 0U,
         .i = measure_phases(sample->i_ab, sample->zero_q28),
-        .i_ref = phases_ref,
+        .i_ref = i_ref,
     };
     short_side_step(&drive->task.short_side, &in);
+}
+
+/* Finds no fault: it decides by which side a short circuit would be made if a fault occurred now. While a fault is
+ * latched or the short circuit is on, the decision of the last step before it is kept: switching is disabled first.
+ * Half a step lies between two samples, so that the second harmonic of a half wave, which may turn by a whole turn in a
+ * step, does not look constant. */
+static void update_short_side(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
+{
+    const uint32_t half_step = drive->period.periods_per_step / 2U;
+    const sample_t *before = sample_box_at(&drive->samples, drive->samples.generation - half_step);
+    if (before->acting) {
+        count_in_short_side(drive, snapshot, before, in_phases(drive->task.i_ref, before->theta_e));
+    }
+    count_in_short_side(drive, snapshot, &snapshot->sample, phases_ref);
 }
 
 uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)

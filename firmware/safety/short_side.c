@@ -3,7 +3,7 @@
 
 #include "signal/mean.h"
 
-#define MEAN_SHIFT 4
+#define MEAN_SHIFT 5
 
 void short_side_step(short_side_state_t *state, const short_side_in_t *in)
 {

@@ -2,7 +2,7 @@
 #ifndef SAFETY_SHORT_SIDE_H
 #define SAFETY_SHORT_SIDE_H
 /** The side of the bridge by which a short circuit would be made: the side whose switches all conduct.
- *   m_x: first-order mean, over 16 steps, of the deviation of phase current x from its reference. The means are kept
+ *   m_x: first-order mean, over 32 samples, of the deviation of phase current x from its reference. The means are kept
  *     during the short circuit, whose currents have a decaying constant part of their own.
  *   Upper switches if the m_x of the largest magnitude is positive and above i_min: in a phase whose lower switch does
  *     not switch on, or whose upper switch is shorted, the mean current flows out of the bridge.

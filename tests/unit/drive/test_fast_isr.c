@@ -186,8 +186,7 @@ static void want_upper_switches(bool upper)
     command_box_write(&drive.commands, command);
 }
 
-/* The task has found a constant current: by the upper switches at once, or from the lower ones to the upper ones. There
- * is no way back, and what the gate drivers end counts for more. */
+/* The task has found a constant current. What the gate drivers end counts for more. */
 void test_the_task_may_request_the_short_circuit_by_the_upper_switches(void)
 {
     seam_run();
@@ -201,8 +200,10 @@ void test_the_task_may_request_the_short_circuit_by_the_upper_switches(void)
     TEST_ASSERT_TRUE(drive_is_shorted(&drive));
     want_upper_switches(false);
     seam_period();
-    expect_shorted_by_the_upper_switches();
+    expect_shorted(true);
     want_upper_switches(true);
+    seam_period();
+    expect_shorted_by_the_upper_switches();
     seam.gates_blocked = true;
     seam_period();
     expect_shorted(true);
@@ -213,6 +214,48 @@ void test_the_task_may_request_the_short_circuit_by_the_upper_switches(void)
     seam_period();
     TEST_ASSERT_FALSE(seam.gates);
     TEST_ASSERT_EQUAL_INT(16384, seam.duty.a);
+}
+
+/* One period of a short circuit in which phase a only conducts in this direction; a turn has twenty. */
+static void short_one_sided(int32_t i_a)
+{
+    const short_circuit_in_t in = {
+        .open_switch = {.i_min = 100, .i_max = 1000, .psi_min = 1000},
+        .i = {i_a, -i_a / 2, -i_a / 2},
+        .angle_step = INT32_MAX / 10,
+    };
+    seam.log[0] = '\0';
+    short_circuit_apply(&drive.fast, &in);
+}
+
+/* Current out of the bridge by the lower switches, then into it by the upper ones, which ends the wait for a reset. */
+void test_a_switch_that_stays_off_changes_the_side_of_the_short_circuit_until_the_bridge_runs_again(void)
+{
+    for (int n = 0; n <= 20; n++) { /* what is on is examined from the second period on */
+        short_one_sided(5000);
+        expect_shorted(true);
+    }
+    short_one_sided(5000);
+    expect_shorted_by_the_upper_switches();
+    for (int n = 0; n < 21; n++) {
+        short_one_sided(-5000 * ((n & 1) ? 1 : -1));
+        expect_shorted_by_the_upper_switches();
+    }
+    short_circuit_end(&drive.fast);
+    short_one_sided(0);
+    expect_shorted_by_the_upper_switches();
+    short_circuit_prepare(&drive.fast, 0);
+    short_one_sided(0);
+    expect_shorted(true);
+}
+
+void test_with_a_gate_fault_the_side_is_found_by_trying_alone(void)
+{
+    drive.fast.faults = FAULT_GATE;
+    for (int n = 0; n < 60; n++) {
+        short_one_sided(5000);
+        expect_shorted(true);
+    }
 }
 
 /* The gate drivers block the short circuit by the lower switches one period after it was on, because one of the upper

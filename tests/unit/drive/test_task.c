@@ -404,11 +404,11 @@ static bool upper_after_constant_current(double omega_pu, bool acting, bool shor
     return command()->upper;
 }
 
-/* Half a turn in a step makes the second harmonic of a half wave constant. */
+/* A whole turn in a step makes the second harmonic of a half wave constant at both samples of the step. */
 void test_a_constant_current_commands_the_upper_switches_unless_it_may_be_a_harmonic(void)
 {
     seam_run();
-    seam.motor.identify.window_turns_q29 = 1U << 29; /* at the speed base */
+    seam.motor.identify.window_turns_q29 = 1U << 30; /* two turns at the speed base */
     for (int sign = -1; sign <= 1; sign += 2) {
         TEST_ASSERT_TRUE(upper_after_constant_current(0.1 * sign, true, false));
         TEST_ASSERT_FALSE(upper_after_constant_current(0.01 * sign, true, false));
@@ -417,6 +417,20 @@ void test_a_constant_current_commands_the_upper_switches_unless_it_may_be_a_harm
         TEST_ASSERT_FALSE(upper_after_constant_current(0.51 * sign, true, false));
         TEST_ASSERT_TRUE(upper_after_constant_current(0.52 * sign, true, false));
     }
+}
+
+/* At half a turn in a step the second harmonic has the opposite value half a step before. */
+void test_a_harmonic_that_turns_once_in_a_step_is_no_constant_current(void)
+{
+    seam_run();
+    seam.motor.identify.window_turns_q29 = 1U << 30;
+    for (uint32_t n = 0; n < SAMPLE_SLOTS; n++) {
+        sample_t *s = sample_box_begin(&drive.samples);
+        *s = (sample_t){.i_ab = fx_pair(-3000, 0), .acting = true};
+        sample_box_publish(&drive.samples);
+    }
+    TEST_ASSERT_FALSE(upper_after_constant_current(0.25, true, false));
+    TEST_ASSERT_INT_WITHIN(60, 0, drive.task.short_side.a_q8 / 256);
 }
 
 /* Switching is disabled before the short circuit begins: what was decided before the fault counts. */

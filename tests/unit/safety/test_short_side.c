@@ -5,7 +5,7 @@
 
 #include "unity.h"
 
-#define I_LEAST 1000
+#define I_MIN 1000
 #define TURN 6.283185307179586
 
 static short_side_state_t state;
@@ -44,7 +44,7 @@ static bool turns(double turn_per_step, int x, int lost_sign)
             .i_ref = currents(10000.0, angle, x, 0),
         };
         short_side_step(&state, &in);
-        upper = short_side_is_upper(&state, I_LEAST);
+        upper = short_side_is_upper(&state, I_MIN);
     }
     return upper;
 }
@@ -70,20 +70,20 @@ void test_a_sound_bridge_is_shorted_by_the_lower_switches(void)
     TEST_ASSERT_FALSE(short_side_is_upper(&(short_side_state_t){0}, 0));
 }
 
-/* 16 steps from 0 to 1 - 1/e of the constant current; beyond i_least it decides, whichever phase it is in. */
-void test_a_constant_current_counts_from_i_least_on(void)
+/* 32 samples from 0 to 1 - 1/e of the constant current; beyond i_min it decides, whichever phase it is in. */
+void test_a_constant_current_counts_from_i_min_on(void)
 {
     for (int x = 0; x < 3; x++) {
         setUp();
         abc_q15_t i = {-600, -600, -600};
         *(x == 0 ? &i.a : x == 1 ? &i.b : &i.c) = 1200;
         const short_side_in_t in = {.acting = true, .i = i};
-        for (int n = 0; n < 27; n++) { /* 1200 (1 - (15/16)^27) = 990 */
+        for (int n = 0; n < 56; n++) { /* 1200 (1 - (31/32)^56) = 997 */
             short_side_step(&state, &in);
-            TEST_ASSERT_FALSE(short_side_is_upper(&state, I_LEAST));
+            TEST_ASSERT_FALSE(short_side_is_upper(&state, I_MIN));
         }
         short_side_step(&state, &in);
-        TEST_ASSERT_TRUE(short_side_is_upper(&state, I_LEAST)); /* 1003 */
+        TEST_ASSERT_TRUE(short_side_is_upper(&state, I_MIN)); /* 1003 */
     }
 }
 
@@ -94,35 +94,35 @@ void test_the_short_circuit_keeps_the_side_and_switching_disabled_clears_it(void
     for (int n = 0; n < 100; n++) {
         short_side_step(&state, &in);
     }
-    TEST_ASSERT_FALSE(short_side_is_upper(&state, I_LEAST));
+    TEST_ASSERT_FALSE(short_side_is_upper(&state, I_MIN));
     TEST_ASSERT_TRUE(turns(0.21, 1, -1));
     in.i = (abc_q15_t){-20000, 10000, 10000};
     for (int n = 0; n < 100; n++) {
         short_side_step(&state, &in);
-        TEST_ASSERT_TRUE(short_side_is_upper(&state, I_LEAST));
+        TEST_ASSERT_TRUE(short_side_is_upper(&state, I_MIN));
     }
     in.shorted = false;
     short_side_step(&state, &in);
-    TEST_ASSERT_FALSE(short_side_is_upper(&state, I_LEAST));
+    TEST_ASSERT_FALSE(short_side_is_upper(&state, I_MIN));
     TEST_ASSERT_EQUAL_INT32(0, state.a_q8);
     TEST_ASSERT_EQUAL_INT32(0, state.b_q8);
 }
 
-/* A sixteenth of the difference, in 1/256 of a count. */
+/* A 32nd of the difference, in 1/256 of a count. */
 void test_the_mean_is_of_the_current_beyond_its_reference(void)
 {
     const short_side_in_t in = {.acting = true, .i = {1600, -800, -800}, .i_ref = {320, 160, -480}};
     short_side_step(&state, &in);
-    TEST_ASSERT_EQUAL_INT32(1280 * 256 / 16, state.a_q8);
-    TEST_ASSERT_EQUAL_INT32(-960 * 256 / 16, state.b_q8);
+    TEST_ASSERT_EQUAL_INT32(1280 * 256 / 32, state.a_q8);
+    TEST_ASSERT_EQUAL_INT32(-960 * 256 / 32, state.b_q8);
 }
 
-void test_just_i_least_or_as_much_of_either_sign_decides_for_the_lower_side(void)
+void test_just_i_min_or_as_much_of_either_sign_decides_for_the_lower_side(void)
 {
     for (int beyond = 0; beyond <= 1; beyond++) {
-        const short_side_state_t least = {.a_q8 = I_LEAST * 256 + beyond, .b_q8 = -I_LEAST * 128};
-        TEST_ASSERT_EQUAL(beyond == 1, short_side_is_upper(&least, I_LEAST));
+        const short_side_state_t least = {.a_q8 = I_MIN * 256 + beyond, .b_q8 = -I_MIN * 128};
+        TEST_ASSERT_EQUAL(beyond == 1, short_side_is_upper(&least, I_MIN));
         const short_side_state_t uneven = {.a_q8 = 2000 * 256, .b_q8 = -2000 * 256 + beyond};
-        TEST_ASSERT_EQUAL(beyond == 1, short_side_is_upper(&uneven, I_LEAST));
+        TEST_ASSERT_EQUAL(beyond == 1, short_side_is_upper(&uneven, I_MIN));
     }
 }
