@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/current/transform.h"
 #include "drive/data_check.h"
-#include "drive/mrai/mrai_seam.h"
+#include "drive/drive.h"
 #include "fx/div.h"
 
 #define DEAD_TIME_MAX Q15(0.125) /* a larger share of the dc voltage is not a plausible voltage error */
@@ -115,12 +115,12 @@ void drive_restore_trim(drive_t *drive, int32_t trim)
     change_dead_time(drive, dead_time_trim_restore(&drive->task.trim, present, trim));
 }
 
-static void start_if_running(drive_t *drive, const commission_config_t *config)
+static void start_if_running(drive_t *drive, const snapshot_t *snapshot, const commission_config_t *config)
 {
     task_state_t *task = &drive->task;
     task->commissionings = drive->request.commissionings;
     task->commission = (commission_state_t){.phase = COMMISSION_FAILED, .failure = COMMISSION_STOPPED};
-    if (task->run_state == RUN_STATE_RUN && !mrai_is_chosen(drive)) {
+    if (task->run_state == RUN_STATE_RUN && !snapshot->mrai_is_chosen) {
         commission_start(config, &task->commission);
     }
 }
@@ -140,7 +140,7 @@ void drive_commission(drive_t *drive, const snapshot_t *snapshot)
         .limited = window->limited != 0U,
     };
     if (drive->request.commissionings != task->commissionings) {
-        start_if_running(drive, config);
+        start_if_running(drive, snapshot, config);
         return;
     }
     const bool ran = commission_runs(&task->commission);

@@ -205,6 +205,7 @@ typedef struct {
     int16_t inverter_dC, winding_dC;
     int16_t known_permille; /* hal_adc_known_permille() */
     q15_t lag;              /* of the tracked speed, torque_monitor_lag() */
+    bool mrai_is_chosen;    /* the paper's identification, throughout this step */
     bool gates;             /* as read back: the switches follow the duties */
     bool angle_absolute;
     bool shorted; /* drive_is_shorted() */

@@ -59,7 +59,7 @@ static void robust_step(drive_t *drive, const snapshot_t *snapshot)
 
 void drive_identify(drive_t *drive, const snapshot_t *snapshot)
 {
-    if (mrai_is_chosen(drive)) {
+    if (snapshot->mrai_is_chosen) {
         mrai_identify(drive, snapshot);
     } else {
         robust_step(drive, snapshot);

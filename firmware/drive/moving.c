@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* A movement of the shaft in the drive: its frame in the fast ISR, and its step in the 1 kHz task. */
-#include "drive/mrai/mrai_seam.h"
+#include "drive/drive.h"
 
 /* With MOVEMENT_CONNECTED alone a small torque may brake the rotor; the second level does not check it meanwhile. */
 static bool has_request(const drive_t *drive)
@@ -14,7 +14,7 @@ void drive_move(drive_t *drive, const snapshot_t *snapshot)
     task_state_t *task = &drive->task;
     const movement_in_t in = {
         .runs = task->run_state == RUN_STATE_RUN,
-        .has_failed = task->run_state == RUN_STATE_FAULT || mrai_is_chosen(drive),
+        .has_failed = task->run_state == RUN_STATE_FAULT || snapshot->mrai_is_chosen,
         .has_request = has_request(drive),
         .theta_m = snapshot->sample.theta_m,
         .omega = drive->frame_angle.omega_sensor,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The 1 kHz task's part of the voltage pulses: it starts or refuses them, and ends them when the drive stops. */
-#include "drive/mrai/mrai_seam.h"
+#include "drive/drive.h"
 
 #define V_MAX Q15(0.7)         /* of both axes at once: inside the voltage circle */
 #define ANGLE_MAX 0x20000000U  /* an eighth of an electrical turn */
@@ -26,7 +26,7 @@ static bool has_no_request(const request_t *request)
 
 static bool may_start(const drive_t *drive, const snapshot_t *snapshot)
 {
-    return drive->task.run_state == RUN_STATE_RUN && !mrai_is_chosen(drive) &&
+    return drive->task.run_state == RUN_STATE_RUN && !snapshot->mrai_is_chosen &&
            !commission_runs(&drive->task.commission) && !drive_is_moving(drive) && has_no_request(&drive->request) &&
            fx_abs_q31(snapshot->sample.point.omega) <= drive->motor->commission.omega_max;
 }

@@ -2,7 +2,6 @@
 #include "drive/slow_monitors.h"
 
 #include "control/current/transform.h"
-#include "drive/mrai/mrai_seam.h"
 #include "drive/step_mean.h"
 
 static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
@@ -13,9 +12,9 @@ static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
     return (abc_q15_t){x.a, x.b, x.c};
 }
 
-static uint8_t gate_exceeded_steps(const drive_t *drive)
+static uint8_t gate_exceeded_steps(const drive_t *drive, const snapshot_t *snapshot)
 {
-    return mrai_is_chosen(drive) ? 0U : (uint8_t)(IDENTIFY_STEPS * drive->task.identify.gate_exceeded_updates);
+    return snapshot->mrai_is_chosen ? 0U : (uint8_t)(IDENTIFY_STEPS * drive->task.identify.gate_exceeded_updates);
 }
 
 /* A rotor that stands induces nothing, and a bridge that does not switch makes no voltage. */
@@ -44,7 +43,7 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q
         .inverter_dC = snapshot->inverter_dC,
         .winding_dC = snapshot->winding_dC,
         .known_permille = snapshot->known_permille,
-        .gate_exceeded_steps = gate_exceeded_steps(drive),
+        .gate_exceeded_steps = gate_exceeded_steps(drive, snapshot),
     };
     return plausibility_step(config, &task->plausibility, &in);
 }
@@ -187,7 +186,7 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
 {
     const uint32_t shorted = drive->task.gate_fault.switch_shorted ? (uint32_t)FAULT_GATE : 0U; /* found last step */
     const abc_q15_t phases_ref = in_phases(drive->task.i_ref, snapshot->sample.theta_e);
-    const bool is_window_new = !mrai_is_chosen(drive) && snapshot->window.acting && snapshot->sample.acting;
+    const bool is_window_new = !snapshot->mrai_is_chosen && snapshot->window.acting && snapshot->sample.acting;
     const bool acting = !is_compensation_new(drive) && is_window_new &&
                         !is_fast(turns_of_step_q60(drive, snapshot->sample.point.omega));
     const uint32_t of_currents = check_currents(drive, snapshot, phases_ref);

@@ -1,11 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/step_mean.h"
 
-#include "drive/mrai/mrai_seam.h"
-
-static bool has_sums(const drive_t *drive, const snapshot_t *snapshot)
+static bool has_sums(const snapshot_t *snapshot)
 {
-    return !mrai_is_chosen(drive) && snapshot->window.acting;
+    return !snapshot->mrai_is_chosen && snapshot->window.acting;
 }
 
 static dq_q15_t mean_of(const drive_t *drive, dq_q15_t sum)
@@ -16,10 +14,10 @@ static dq_q15_t mean_of(const drive_t *drive, dq_q15_t sum)
 
 dq_q15_t step_mean_current(const drive_t *drive, const snapshot_t *snapshot)
 {
-    return has_sums(drive, snapshot) ? mean_of(drive, snapshot->window.sum_i) : snapshot->sample.point.i;
+    return has_sums(snapshot) ? mean_of(drive, snapshot->window.sum_i) : snapshot->sample.point.i;
 }
 
 dq_q15_t step_mean_voltage(const drive_t *drive, const snapshot_t *snapshot)
 {
-    return has_sums(drive, snapshot) ? mean_of(drive, snapshot->window.sum_u) : snapshot->sample.point.u;
+    return has_sums(snapshot) ? mean_of(drive, snapshot->window.sum_u) : snapshot->sample.point.u;
 }

@@ -197,13 +197,14 @@ static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_
 static void take_snapshot(const drive_t *drive, snapshot_t *snapshot)
 {
     uint32_t generation;
+    snapshot->mrai_is_chosen = mrai_is_chosen(drive);
     do {
         generation = drive->samples.generation;
         exchange_barrier();
         snapshot->sample = *sample_box_at(&drive->samples, generation);
         snapshot->i_last_period = sample_box_at(&drive->samples, generation - 1U)->point.i;
         snapshot->window = *window_box_at(&drive->windows);
-        if (mrai_is_chosen(drive)) {
+        if (snapshot->mrai_is_chosen) {
             mrai_snapshot(drive, snapshot);
         }
         snapshot->psi_d_error = drive->psi_d_error;
@@ -239,7 +240,7 @@ void task_1khz(drive_t *drive)
     operating_point_t commanded = snapshot.sample.point;
     command_fast_isr(drive, &snapshot, faults, &commanded);
     task->flow = flow_pass(task->flow, FLOW_COMMANDED);
-    if (mrai_is_chosen(drive)) {
+    if (snapshot.mrai_is_chosen) {
         mrai_reschedule(drive, &snapshot, &commanded);
     }
 }

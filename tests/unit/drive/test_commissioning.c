@@ -83,7 +83,7 @@ void test_it_starts_only_while_the_drive_runs_with_the_robust_identification(voi
     for (int paper = 0; paper < 2; paper++) {
         setUp();
         drive.task.run_state = paper ? RUN_STATE_RUN : RUN_STATE_OFF;
-        drive.request.identification_mode = paper ? IDENTIFICATION_PAPER : IDENTIFICATION_ROBUST;
+        snapshot.mrai_is_chosen = paper;
         ask();
         TEST_ASSERT_EQUAL_INT(COMMISSION_FAILED, commission->phase);
         TEST_ASSERT_EQUAL_INT(COMMISSION_STOPPED, commission->failure);

@@ -105,7 +105,7 @@ void test_pulses_need_a_drive_that_runs_at_standstill_with_nothing_else_to_do(vo
 {
     drive.task.run_state = RUN_STATE_OFF;
     refused();
-    drive.request.identification_mode = IDENTIFICATION_PAPER;
+    snapshot.mrai_is_chosen = true;
     refused();
     drive.task.commission.phase = COMMISSION_SETTLE;
     refused();

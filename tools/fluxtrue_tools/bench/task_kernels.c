@@ -82,6 +82,7 @@ CALLED void task_copy(void)
     copy = *drive_now();
     snapshot.sample = *sample_box_at(&copy.samples, copy.samples.generation);
     snapshot.window = *window_box_at(&copy.windows);
+    snapshot.mrai_is_chosen = mrai_is_chosen(&copy);
     mrai_snapshot(&copy, &snapshot);
     snapshot.psi_d_error = copy.psi_d_error;
     snapshot.faults = copy.fast.faults;
