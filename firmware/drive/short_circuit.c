@@ -75,7 +75,8 @@ void short_circuit_step(drive_t *drive, const sample_t *sample, bool upper, int3
     const ab_q30_t psi_q30 = inverse_park_q30(psi, fx_rotation(sample->theta_e));
     const short_circuit_in_t in = {
         .upper = upper,
-        .open_switch = {m->plausibility.i_dead, m->current_reference.i_max, (q15_t)(m->safe_state.psi_f / 2)},
+        .open_switch = {m->plausibility.i_dead, m->current_reference.i_max, (q15_t)(m->safe_state.psi_f / 2),
+                        m->monitor.sum_max},
         .i = measure_phases(sample->i_ab, sample->zero_q28),
         .psi = {transform_round(psi_q30.alpha), transform_round(psi_q30.beta)},
         .angle_step = angle_step,

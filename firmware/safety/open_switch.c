@@ -69,11 +69,14 @@ open_switch_t open_switch_step(const open_switch_config_t *config, open_switch_s
 {
     const int32_t largest = fx_max_s32(largest_of(in->i), -smallest_of(in->i));
     const uint32_t step_q16 = (uint32_t)fx_abs_q31(in->angle_step) >> 16;
-    add_flux(state, in, largest <= config->i_max, step_q16);
+    const bool plausible = fx_abs_q31(in->i.a + in->i.b + in->i.c) <= config->sum_max;
+    add_flux(state, in, plausible && largest <= config->i_max, step_q16);
     const open_switch_t by_flux = shown_by_flux(config, state);
-    const uint32_t significant_q16 = (largest < SIGNIFICANT * config->i_min) ? 0U : step_q16;
-    if (!is_one_sided(state, in, config->i_min, significant_q16) || by_flux != OPEN_SWITCH_NONE) {
+    if (!plausible || by_flux != OPEN_SWITCH_NONE) {
         return by_flux;
+    }
+    if (!is_one_sided(state, in, config->i_min, (largest < SIGNIFICANT * config->i_min) ? 0U : step_q16)) {
+        return OPEN_SWITCH_NONE;
     }
     return in->upper ? OPEN_SWITCH_UPPER : OPEN_SWITCH_LOWER;
 }

@@ -9,6 +9,8 @@
  *     short circuit has no voltage and keeps the flux. Begun anew where a phase current is beyond i_max.
  *   d_x: angle by which the field has turned since i_x last was above i_min in the direction that the diode blocks, not
  *     counted while all three currents are below 2 i_min
+ *   Currents whose sum is above sum_max in magnitude are not counted, because a sensor is wrong or saturated; the sum
+ *     begins anew after them.
  *   lower switch open: the s_x of the largest magnitude is above psi_min, or by the lower switches a d_x has reached a
  *     whole turn; upper switch open: the opposite signs, the upper switches
  *   The flux of the beginning adds a constant part to the currents, which may last for several turns and look like d_x.
@@ -26,9 +28,10 @@
 #include "types/frames.h"
 
 typedef struct {
-    q15_t i_min;   /* a phase current up to this counts as none */
-    q15_t i_max;   /* up to this the tables have the flux */
-    q15_t psi_min; /* flux that only a phase without its switch can get */
+    q15_t i_min;     /* a phase current up to this counts as none */
+    q15_t i_max;     /* up to this the tables have the flux */
+    q15_t psi_min;   /* flux that only a phase without its switch can get */
+    int32_t sum_max; /* largest sum of the three currents that is plausible */
 } open_switch_config_t;
 
 typedef struct {

@@ -10,7 +10,7 @@
 #define I_MAX 20000
 #define PSI_MIN 8000
 
-static const open_switch_config_t config = {.i_min = I_MIN, .i_max = I_MAX, .psi_min = PSI_MIN};
+static const open_switch_config_t config = {.i_min = I_MIN, .i_max = I_MAX, .psi_min = PSI_MIN, .sum_max = 1500};
 static open_switch_state_t state;
 
 void setUp(void)
@@ -140,6 +140,30 @@ void test_the_sum_begins_anew_after_a_current_beyond_i_max(void)
     TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(14000.0, 0.0, false, 100));
     TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(22000.0, 0.0, false, 100));
     TEST_ASSERT_EQUAL(OPEN_SWITCH_LOWER, with_flux(22001.0, 0.0, false, 100));
+}
+
+/* A sensor that is stuck at 5000: the sum of the three is above 1500 in almost every period. */
+void test_currents_that_do_not_add_up_are_not_counted(void)
+{
+    for (int n = 0; n < 200; n++) {
+        open_switch_in_t in = sample(0.05 * n, 5000.0, 0, 0.0, false);
+        in.i.c = 5000;
+        in.angle_step = angle_of(0.05);
+        in.psi.alpha = 400 * (n % 50);
+        const int32_t sum = in.i.a + in.i.b + in.i.c;
+        const open_switch_t found = open_switch_step(&config, &state, &in);
+        TEST_ASSERT_TRUE(found == OPEN_SWITCH_NONE || (sum >= -1500 && sum <= 1500));
+    }
+    setUp();
+    open_switch_in_t in = {.i = {5000, -1750, -1750}, .angle_step = angle_of(0.05)};
+    for (int n = 0; n < 30; n++) {
+        TEST_ASSERT_EQUAL(n < 20 ? OPEN_SWITCH_NONE : OPEN_SWITCH_LOWER, open_switch_step(&config, &state, &in));
+    }
+    setUp();
+    in.i.c = -1749;
+    for (int n = 0; n < 30; n++) {
+        TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, open_switch_step(&config, &state, &in));
+    }
 }
 
 /* The resistance changes the flux of a complete short circuit slowly. A turn has 20 periods: 20 * 150 is below psi_min,
