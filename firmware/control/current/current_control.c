@@ -35,10 +35,7 @@ static inline void follow(rotating_flux_t *rotating, dq_q15_t to, int32_t psi_ma
     const dq_q15_t change = {to.d - rotating->psi.d, to.q - rotating->psi.q};
     const int32_t largest = fx_max_s32(fx_abs_q31(change.d), fx_abs_q31(change.q));
     const int32_t at_once = rotating->behind ? psi_magnet >> REACHED_SHIFT : psi_magnet - (psi_magnet >> 2);
-    int32_t quarters = 4;
-    if (largest > at_once) {
-        quarters = rotating->behind ? 3 : 2;
-    }
+    const int32_t quarters = (largest > at_once) ? 2 + rotating->behind : 4;
     rotating->behind = quarters < 4;
     rotating->psi = (dq_q15_halfword_t){fx_sat_q15(rotating->psi.d + ((change.d * quarters) >> 2)),
                                         fx_sat_q15(rotating->psi.q + ((change.q * quarters) >> 2))};

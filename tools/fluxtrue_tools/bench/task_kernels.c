@@ -197,8 +197,8 @@ CALLED void task_target(void)
     next.i = d->task.reference.i_ref;
     next.flux = flux_table_step(&d->motor->flux_table, next.i);
     command_t command = {.run = true};
-    command.target = current_control_target(&d->parameters.current_control, &next, 32 * snapshot.psi_d_error / 21,
-                                            &d->task.rotating);
+    command.target = current_control_target(&d->parameters.current_control, &next,
+                                            current_control_by_target(snapshot.psi_d_error), &d->task.rotating);
     command_box_write(&d->commands, command);
 }
 
