@@ -185,7 +185,7 @@ static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_
                                                 current_control_by_target(snapshot->psi_d_error), &task->rotating);
     } else {
         reset_torque_path(drive);
-        task->rotating = (rotating_flux_t){.psi = {(q15_t)commanded->flux.psi_d, (q15_t)commanded->flux.psi_q}};
+        task->rotating = (rotating_flux_t){.psi = {commanded->flux.psi_d, commanded->flux.psi_q}};
     }
     command.safe = safe_decision_step(drive, snapshot);
     command.upper = safe_decision_is_upper(drive);

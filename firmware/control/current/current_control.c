@@ -29,16 +29,25 @@ static inline int32_t proportional_reference(int32_t weighted, q16_t drop_gain, 
     return fx_sat_bits(with_drop * 32768 + turned_q30, 31);
 }
 
+/* Whether x is outside [-limit, limit]. */
+static inline bool is_beyond(int32_t x, int32_t limit)
+{
+    return (uint32_t)(x + limit) > 2U * (uint32_t)limit;
+}
+
 /* (CC-25) */
 static inline void follow(rotating_flux_t *rotating, dq_q15_t to, int32_t psi_magnet)
 {
-    const dq_q15_t change = {to.d - rotating->psi.d, to.q - rotating->psi.q};
-    const int32_t largest = fx_max_s32(fx_abs_q31(change.d), fx_abs_q31(change.q));
+    dq_q15_t left = {to.d - rotating->psi.d, to.q - rotating->psi.q};
     const int32_t at_once = rotating->behind ? psi_magnet >> REACHED_SHIFT : psi_magnet - (psi_magnet >> 2);
-    const int32_t quarters = (largest > at_once) ? 2 + rotating->behind : 4;
-    rotating->behind = quarters < 4;
-    rotating->psi = (dq_q15_halfword_t){fx_sat_q15(rotating->psi.d + ((change.d * quarters) >> 2)),
-                                        fx_sat_q15(rotating->psi.q + ((change.q * quarters) >> 2))};
+    const int shift = 1 + rotating->behind;
+    rotating->behind = is_beyond(left.d, at_once) || is_beyond(left.q, at_once);
+    if (rotating->behind) {
+        to.d -= left.d >> shift;
+        to.q -= left.q >> shift;
+    }
+    rotating->psi.d = fx_sat_q15_word(to.d);
+    rotating->psi.q = fx_sat_q15_word(to.q);
 }
 
 FX_COLD current_target_t current_control_target(const current_control_config_t *config, const operating_point_t *at,

@@ -57,7 +57,7 @@ typedef struct {
 
 /** r: flux whose rotational voltage the target makes. */
 typedef struct {
-    dq_q15_halfword_t psi;
+    dq_q15_t psi;
     bool behind; /* after a change too large to be made at once */
 } rotating_flux_t;
 

@@ -126,7 +126,7 @@ def test_no_gain_keeps_the_margin_while_all_of_the_feed_forward_follows_the_meas
 
 
 def test_the_firmware_has_the_share_of_the_model() -> None:
-    source = (ROOT / "firmware" / "control" / "current" / "current_control.c").read_text(encoding="utf-8")
+    source = (ROOT / "firmware" / "control" / "current" / "current_control.h").read_text(encoding="utf-8")
     assert f"#define MEASURED_SHARE_Q5 {32 * MEASURED_SHARE:g} " in source
 
 

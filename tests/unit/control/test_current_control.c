@@ -243,7 +243,7 @@ void test_the_followed_flux_is_that_of_the_twin(void)
         (void)twin_current_target(&f.si, (twin_dq_t){from_q15(i.d) * f.i, from_q15(i.q) * f.i}, 0.0, 0.0, &twin);
         behind += rotating.behind ? 1 : 0;
         if (rotating.behind != twin.behind) { /* a bound lies within the error of the tables */
-            twin = (twin_rotating_t){si_psi(words(rotating.psi)), rotating.behind};
+            twin = (twin_rotating_t){si_psi(rotating.psi), rotating.behind};
         }
         TEST_ASSERT_DOUBLE_WITHIN(6.0, twin.psi.d / f.psi * 32768.0, rotating.psi.d);
         TEST_ASSERT_DOUBLE_WITHIN(6.0, twin.psi.q / f.psi * 32768.0, rotating.psi.q);

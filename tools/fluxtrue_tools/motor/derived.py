@@ -11,7 +11,7 @@ from fluxtrue_tools.motor.flux_model import FluxModel
 
 DELAY_PERIODS = 1.5  # one of computation, a half of the PWM's hold
 CLOSED_LOOP_SHARE = 0.8
-MEASURED_SHARE = 11 / 32  # of the rotational voltage, by the measured flux (CC-24); in current_control.c
+MEASURED_SHARE = 11 / 32  # of the rotational voltage, by the measured flux (CC-24); in current_control.h
 TURNING_FEEDBACK, TURNING_INTEGRAL = 0.28, 0.045  # per period (CC-18), (CC-19)
 TURNING_APPROACH = 0.08  # per period: L 20 % too small overshoots by less than 5 % with an ideal inverter (CC-21)
 SINC_SERIES_MAX = 0.6  # rad: up to here 1 + theta^2/24 is 1/sinc(theta/2), (MR-5); beyond it is fitted at maximum speed
