@@ -51,6 +51,19 @@
 /* A copy of its instructions in each caller, or in this function those of everything that it calls. */
 #define FX_INLINED __attribute__((always_inline))
 #define FX_INLINES_CALLS __attribute__((flatten))
+/* FX_INLINED if the compiler optimises. Without optimisation, as in the build that measures coverage, the branches of
+ * an inlined function would be counted in each caller. */
+#ifdef __OPTIMIZE__
+#define FX_INLINED_IF_OPTIMISED FX_INLINED
+#else
+#define FX_INLINED_IF_OPTIMISED
+#endif
+/* The passes of the loop that follows, eight at most, are written one behind the other, so that what depends on the
+ * pass alone is a constant. */
+#define FX_UNROLLED _Pragma("GCC unroll 8")
+
+/* A type whose objects may be parts of objects of any other type. */
+#define FX_ANY_OBJECT __attribute__((may_alias))
 
 /* The same value in a register, opaque to the compiler: it neither recomputes the value nor folds it into other
  * operations, and a branch that computes it stays a branch. */
@@ -78,7 +91,7 @@ static inline void fx_compiler_barrier(void)
 
 typedef struct {
     int32_t first, second;
-} __attribute__((may_alias)) fx_two_words_t;
+} FX_ANY_OBJECT fx_two_words_t;
 
 static inline fx_two_words_t fx_load_two_words(const int32_t *from)
 {

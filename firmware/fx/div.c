@@ -20,7 +20,7 @@ q31_t fx_div_q31(int32_t num, int32_t den)
         return (n == 0U) ? 0 : (sign ^ INT32_MAX);
     }
     /* The common shift keeps n < d. The quotient n / d * 2^32 is halved when it is rounded. */
-    const unsigned shift = (unsigned)__builtin_clz(d);
+    const unsigned shift = fx_leading_zeros(d);
     const uint32_t d_high = (d << shift) >> 16;
     const uint32_t d_low = (d << shift) & 0xFFFFU;
     uint32_t remainder = n << shift;

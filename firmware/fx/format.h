@@ -135,6 +135,12 @@ static inline q31_t fx_q31_from_q15(q15_t x)
     return (q31_t)x * 65536;
 }
 
+/* Zero bits above the highest one; x > 0. */
+static inline unsigned fx_leading_zeros(uint32_t x)
+{
+    return (unsigned)__builtin_clz(x);
+}
+
 static inline int32_t fx_min_s32(int32_t a, int32_t b)
 {
     return (a < b) ? a : b;

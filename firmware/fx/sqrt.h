@@ -31,7 +31,7 @@ static inline q15_t fx_sqrt_q30(uint32_t q30)
     if (q30 == 0U) {
         return 0;
     }
-    const unsigned shift = (unsigned)__builtin_clz(q30) & 30U;
+    const unsigned shift = fx_leading_zeros(q30) & 30U;
     const uint32_t m = q30 << shift;
     /* Q31 * Q29 = Q28: sqrt(m) = m / sqrt(m) */
     const int32_t root = fx_mulhi((int32_t)(m >> 1), fx_rsqrt_normalised(m));

@@ -48,7 +48,7 @@ static inline FX_INLINED void copy_each(int16_t *first, rows_t rows, const uint8
                                         const uint32_t signals)
 {
     size_t place[CAPTURE_SIGNALS_MAX];
-#pragma GCC unroll 8
+    FX_UNROLLED
     for (uint32_t k = 0; k < signals; k++) {
         place[k] = places_in_row[k];
     }
@@ -56,7 +56,7 @@ static inline FX_INLINED void copy_each(int16_t *first, rows_t rows, const uint8
     int16_t *to = first;
     uint32_t left = rows.count;
     do {
-#pragma GCC unroll 8
+        FX_UNROLLED
         for (uint32_t k = 0; k < signals; k++) {
             to[k] = value_at(&from[place[k]]);
         }

@@ -9,6 +9,7 @@
  * Context  1 kHz task; the fast ISR may write other slots of the ring meanwhile */
 #include <stddef.h>
 
+#include "fx/codegen.h"
 #include "scope/capture_state.h"
 
 /** A signal from the capture's next period on. */
@@ -17,7 +18,7 @@ typedef struct {
     size_t stride; /* bytes from one sample to the next; 0: a value of the step */
 } column_t;
 
-typedef int16_t __attribute__((may_alias)) halfword_t;
+typedef int16_t FX_ANY_OBJECT halfword_t;
 
 static inline int16_t value_at(const uint8_t *from)
 {

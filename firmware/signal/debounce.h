@@ -15,16 +15,9 @@
 #include "fx/codegen.h"
 #include "fx/q.h"
 
-/* Inlined: calls would add some 100 instructions to a step of the 1 kHz task. Without optimisation, as in the build
- * that measures coverage, it is a function; otherwise its branches would be counted in every caller. */
-#ifdef __OPTIMIZE__
-#define DEBOUNCE_INLINE FX_INLINED static inline
-#else
-#define DEBOUNCE_INLINE static inline
-#endif
-
-/** True while the condition has held in this and the (samples - 1) calls before. */
-DEBOUNCE_INLINE bool debounce_holds(uint8_t *count, bool condition, uint8_t samples)
+/** True while the condition has held in this and the (samples - 1) calls before. Calls that are not inlined would add
+ * some 100 instructions to a step of the 1 kHz task. */
+static inline FX_INLINED_IF_OPTIMISED bool debounce_holds(uint8_t *count, bool condition, uint8_t samples)
 {
     *count = condition ? (uint8_t)fx_min_s32(*count + 1, samples) : 0;
     return *count >= samples;

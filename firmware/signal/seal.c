@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "signal/seal.h"
 
+#include "fx/codegen.h"
+
 /* A word of the sealed data, whose members may have any type. */
-typedef uint32_t __attribute__((may_alias)) sealed_word_t;
+typedef uint32_t FX_ANY_OBJECT sealed_word_t;
 
 uint32_t seal_of(const void *data, uint32_t size)
 {

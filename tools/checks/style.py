@@ -57,7 +57,10 @@ WORDS = re.compile("|".join(FORBIDDEN), re.IGNORECASE)
 CASED = re.compile(FORBIDDEN[0])
 # Compiler tricks and single instructions have names in firmware/fx, which say what they save (fx/codegen.h).
 TRICK = re.compile(r"\b(__asm__|asm|fx_arch_\w+)\b\s*(?:volatile\b|goto\b)?\s*\(")
-HINT = re.compile(r"(__builtin_expect)\b|__attribute__\(\(.*\b(always_inline|cold|flatten|noinline)\b")
+HINT = re.compile(
+    r"(__builtin_\w+|#pragma|_Pragma|__OPTIMIZE__)\b"
+    r"|__attribute__\(\(.*\b(always_inline|cold|flatten|may_alias|noinline)\b"
+)
 # Files that have to contain what they forbid.
 EXEMPT = {"tools/checks/style.py", "tests/tools/test_checks.py"}
 

@@ -90,7 +90,7 @@ int64_t kalman_output_variance_prior(const jacobian_row_t *row)
 static reciprocal_t reciprocal(int64_t s_q60)
 {
     const int64_t limited_q60 = (s_q60 < S_MIN_Q60) ? S_MIN_Q60 : s_q60;
-    const unsigned shift = 64U - (unsigned)__builtin_clz((uint32_t)(limited_q60 >> 32)) - DIVISOR_BITS;
+    const unsigned shift = 64U - fx_leading_zeros((uint32_t)(limited_q60 >> 32)) - DIVISOR_BITS;
     const uint32_t mantissa = (uint32_t)(limited_q60 >> shift) + 1U;
     return (reciprocal_t){UINT32_MAX / mantissa, shift};
 }
