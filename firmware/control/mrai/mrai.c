@@ -113,14 +113,6 @@ static void begin_period(const mrai_schedule_t *schedule, mrai_state_t *state, c
     state->predicted_q_q27 = predicted_q;
 }
 
-FX_COLD void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
-                        const operating_point_t *in)
-{
-    dq_q15_t psi;
-    const dq_q27_t half = half_voltage(config, in, weighted(&in->i), state->psi_delta, state->r_delta, &psi);
-    begin_period(schedule, state, &in->u, psi, (dq_q27_t){0, 0}, half);
-}
-
 /* The voltage equation over the period that ends with this sample, in flux (MR-6); trapezoidal means make it exact in
  * steady state. In Q27 the d axis is the larger one: 4 + 2 (1 + 1 + 0.8) + 2 + 2 (1 + 1) < 16. */
 void mrai_step(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
@@ -140,4 +132,20 @@ void mrai_step(const mrai_config_t *config, const mrai_schedule_t *schedule, mra
     const dq_q27_t now = {fx_sat_bits(e.d + psi.d * (4096 * WEIGHT_D) + half.d, ERROR_BITS),
                           fx_sat_bits(e.q + psi.q * 4096 + half.q, ERROR_BITS)};
     begin_period(schedule, state, &in->u, psi, now, half);
+}
+
+/* The step of a state without error changes no parameter, because its innovations are zero, and leaves in e the flux
+ * that the terms of the next error begin with: without it they are those of an observer that has just started. */
+FX_COLD void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
+                        const operating_point_t *in)
+{
+    state->e_d_q27 = 0;
+    state->e_q_q27 = 0;
+    state->predicted_d_q27 = 0;
+    state->predicted_q_q27 = 0;
+    mrai_step(config, schedule, state, in);
+    state->predicted_d_q27 -= state->e_d_q27;
+    state->predicted_q_q27 -= state->e_q_q27;
+    state->e_d_q27 = 0;
+    state->e_q_q27 = 0;
 }
