@@ -465,7 +465,7 @@ current_target_t __wrap_current_control_target(const current_control_config_t *c
         return __real_current_control_target(config, at, psi_d_error, rotating);
     }
     there.flux = flux_table_step(&under_test->ecu.motor.flux_table, there.i);
-    return __real_current_control_target(config, &there, psi_delta, rotating);
+    return __real_current_control_target(config, &there, psi_d_error, rotating);
 }
 
 rx_result_t __real_can_rx_frame(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame);
