@@ -20,7 +20,10 @@ ARM_FLAGS = (
     "-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-fno-schedule-insns", "-fno-caller-saves",
 )  # fmt: skip
 COMMON = ("-std=c11", "-O2", "-ffp-contract=off", f"-I{FIRMWARE}")
-SMALL = ("-Os", "-fcaller-saves", "-fno-schedule-insns2", "-fno-move-loop-invariants")
+SMALL = (
+    "-Os", "-fcaller-saves", "-fno-reorder-blocks", "-fno-partial-inlining", "-fno-schedule-insns2",
+    "-fno-move-loop-invariants",
+)  # fmt: skip
 _LIST = (FIRMWARE / "fast_sources.txt").read_text(encoding="utf-8").splitlines()
 FAST = frozenset(FIRMWARE / line for line in _LIST if not line.startswith("#"))
 
