@@ -83,9 +83,10 @@ typedef enum {
 
 typedef struct {
     short_circuit_side_t side;
-    bool holds;    /* the short circuit is on, as read back */
-    bool is_found; /* the side has been changed because of a switch that does not switch on */
-    uint8_t waits; /* periods with switching disabled that come before it, (SS-21) */
+    bool holds;         /* the short circuit is on, as read back */
+    bool is_found;      /* the side has been changed because of a switch that does not switch on */
+    uint8_t waits;      /* periods with switching disabled that come before it, (SS-21) */
+    bool searches_flux; /* the flux is searched in every second period */
     open_switch_state_t open_switch;
 } short_circuit_t;
 
@@ -195,6 +196,7 @@ typedef struct {
 /** All inputs of one step of the 1 kHz task from higher priorities and from the port, from the same moment. */
 typedef struct {
     sample_t sample;
+    uint32_t generation;    /* of the sample: its place in the ring */
     dq_q15_t i_last_period; /* measured in the period before the sample's */
     identify_window_t window;
 #if FLUXTRUE_MRAI

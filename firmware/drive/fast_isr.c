@@ -22,9 +22,10 @@
 
 #define PERIODS_TO_ACT 3 /* from enabling until the voltage of the whole last period is known */
 
-/* For current control and modulation. advanced: where the duties will act; angle_step: 2^32 = one turn; v_dc: q15. */
+/* For current control and modulation. rotation: of the sample's angle; advanced: where the duties will act;
+ * angle_step: 2^32 = one turn; v_dc: q15. */
 typedef struct {
-    fx_pair_t i_dq, advanced;
+    fx_pair_t i_dq, rotation, advanced;
     int32_t v_dc;
     int32_t angle_step;
 } rotor_frame_t;
@@ -40,10 +41,10 @@ static void reset_control(drive_t *drive, sample_t *sample)
 }
 
 /* The safe state: all switches of one side on (short circuit), or switching disabled (freewheel). */
-static void apply_safe_state(drive_t *drive, sample_t *sample, const command_t *command, int32_t angle_step)
+static void apply_safe_state(drive_t *drive, sample_t *sample, const command_t *command, const rotor_frame_t *now)
 {
     if (!short_circuit_waits(&drive->fast) && short_circuit_is_needed(drive->fast.faults, command->safe)) {
-        short_circuit_step(drive, sample, command->upper, angle_step);
+        short_circuit_step(drive, sample, command->upper, now->angle_step, now->rotation);
     } else {
         short_circuit_end(&drive->fast);
     }
@@ -164,12 +165,13 @@ static void reset_faults(drive_t *drive, uint32_t requested)
 /* Park, the flux tables, and the angle in the middle of the period in which the duties will act: 1.5 periods ahead. */
 static rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *sample, int32_t angle_step)
 {
-    const dq_q15_t measured = park_pair(sample->i_ab, fx_rotation(sample->theta_e));
+    const fx_pair_t rotation = fx_rotation(sample->theta_e);
+    const dq_q15_t measured = park_pair(sample->i_ab, rotation);
     sample->point.i = measured;
     const uint32_t ahead = (uint32_t)angle_step + (uint32_t)(angle_step >> 1);
     const fx_pair_t advanced = fx_rotation(sample->theta_e + ahead);
     sample->point.flux = flux_table_step(&drive->period.flux_table, measured);
-    return (rotor_frame_t){fx_pair(measured.d, measured.q), advanced, sample->v_dc, angle_step};
+    return (rotor_frame_t){fx_pair(measured.d, measured.q), rotation, advanced, sample->v_dc, angle_step};
 }
 
 /* During the pulses only the monitors of the samples act: there is no identification and no slow monitor. */
@@ -211,7 +213,7 @@ static FX_NOT_INLINED FX_COLD void run_period_checked(drive_t *drive, sample_t *
         if (command->faults != 0U) {
             drive_raise_fault(drive, command->faults);
         }
-        apply_safe_state(drive, sample, command, angle_step);
+        apply_safe_state(drive, sample, command, &now);
     }
     fast->is_settled = !turning && fast->periods_since_enable >= PERIODS_TO_ACT && fast->monitor.pending == 0U;
     publish_sample(drive, sample);

@@ -20,39 +20,63 @@ static short_circuit_side_t side_after(short_circuit_side_t side)
 }
 
 /* With a gate fault the sides are tried instead: a shorted switch does not make the short circuit incomplete. */
-static open_switch_t find_open_switch(fast_state_t *fast, const short_circuit_in_t *in)
+static bool is_searched(const fast_state_t *fast)
 {
-    short_circuit_t *state = &fast->short_circuit;
-    if (!state->holds || (fast->faults & FAULT_GATE) != 0U) {
-        state->open_switch = (open_switch_state_t){0};
-        return OPEN_SWITCH_NONE;
-    }
-    const open_switch_in_t open_switch = {in->i, in->psi, in->angle_step, state->side == SHORT_CIRCUIT_UPPER};
-    return open_switch_step(&in->open_switch, &state->open_switch, &open_switch);
+    return fast->short_circuit.holds && (fast->faults & FAULT_GATE) == 0U;
 }
 
-static short_circuit_side_t without_open_switch(fast_state_t *fast, const short_circuit_in_t *in)
+static bool is_plausible(const motor_t *m, const sample_t *sample)
 {
-    short_circuit_t *state = &fast->short_circuit;
-    const open_switch_t found = find_open_switch(fast, in);
-    if (found == (state->side == SHORT_CIRCUIT_UPPER ? OPEN_SWITCH_UPPER : OPEN_SWITCH_LOWER)) {
-        state->open_switch = (open_switch_state_t){0};
+    return fx_abs_q31(sample->zero_q28 >> 13) <= m->monitor.zero_sequence_max;
+}
+
+/* The flux in every second period only: its sum has no need of every period, the direction of a current has. */
+static open_switch_t search(drive_t *drive, const sample_t *sample, int32_t angle_step, fx_pair_t rotation)
+{
+    const motor_t *m = drive->motor;
+    short_circuit_t *state = &drive->fast.short_circuit;
+    const open_switch_config_t config = {m->plausibility.i_dead, m->current_reference.i_max,
+                                         (q15_t)(m->safe_state.psi_f / 2)};
+    const dq_q15_t i = sample->point.i;
+    const int32_t i_squared_q30 = is_plausible(m, sample) ? i.d * i.d + i.q * i.q : OPEN_SWITCH_NOT_PLAUSIBLE;
+    const uint32_t step_q16 = (uint32_t)fx_abs_q31(angle_step) >> 16;
+    state->searches_flux = !state->searches_flux;
+    if (state->searches_flux) {
+        const flux_point_t *flux = &sample->point.flux;
+        const dq_q15_t psi = {fx_sat_q15(flux->psi_d + drive->psi_d_error), fx_sat_q15(flux->psi_q)};
+        const ab_q30_t psi_q30 = inverse_park_q30(psi, rotation);
+        const ab_q15_t stator = {transform_round(psi_q30.alpha), transform_round(psi_q30.beta)};
+        const open_switch_t found = open_switch_by_flux(&config, &state->open_switch, stator, i_squared_q30,
+                                                        2U * step_q16);
+        if (found != OPEN_SWITCH_NONE) {
+            return found;
+        }
+    }
+    const open_switch_in_t in = {measure_phases(sample->i_ab, sample->zero_q28), i_squared_q30, step_q16,
+                                 state->side == SHORT_CIRCUIT_UPPER};
+    return open_switch_by_currents(&config, &state->open_switch, &in);
+}
+
+static short_circuit_side_t without_open_switch(short_circuit_t *state, bool upper, open_switch_t found)
+{
+    if (found == ((state->side == SHORT_CIRCUIT_UPPER) ? OPEN_SWITCH_UPPER : OPEN_SWITCH_LOWER)) {
+        open_switch_reset(&state->open_switch);
         state->is_found = true;
         return (found == OPEN_SWITCH_UPPER) ? SHORT_CIRCUIT_LOWER : SHORT_CIRCUIT_UPPER;
     }
     if (state->is_found) {
         return state->side;
     }
-    return in->upper ? SHORT_CIRCUIT_UPPER : SHORT_CIRCUIT_LOWER;
+    return upper ? SHORT_CIRCUIT_UPPER : SHORT_CIRCUIT_LOWER;
 }
 
-void short_circuit_apply(fast_state_t *fast, const short_circuit_in_t *in)
+void short_circuit_apply(fast_state_t *fast, bool upper, open_switch_t found)
 {
     short_circuit_t *state = &fast->short_circuit;
     if (state->holds && !hal_pwm_gates()) {
         state->side = side_after(state->side);
     } else if (state->side <= SHORT_CIRCUIT_UPPER) {
-        state->side = without_open_switch(fast, in);
+        state->side = without_open_switch(state, upper, found);
     } else {
         /* the only side that is left */
     }
@@ -67,21 +91,15 @@ void short_circuit_apply(fast_state_t *fast, const short_circuit_in_t *in)
     state->holds = hal_pwm_gates();
 }
 
-void short_circuit_step(drive_t *drive, const sample_t *sample, bool upper, int32_t angle_step)
+void short_circuit_step(drive_t *drive, const sample_t *sample, bool upper, int32_t angle_step, fx_pair_t rotation)
 {
-    const motor_t *m = drive->motor;
-    const flux_point_t *flux = &sample->point.flux;
-    const dq_q15_t psi = {fx_sat_q15(flux->psi_d + drive->psi_d_error), fx_sat_q15(flux->psi_q)};
-    const ab_q30_t psi_q30 = inverse_park_q30(psi, fx_rotation(sample->theta_e));
-    const short_circuit_in_t in = {
-        .upper = upper,
-        .open_switch = {m->plausibility.i_dead, m->current_reference.i_max, (q15_t)(m->safe_state.psi_f / 2),
-                        m->monitor.sum_max},
-        .i = measure_phases(sample->i_ab, sample->zero_q28),
-        .psi = {transform_round(psi_q30.alpha), transform_round(psi_q30.beta)},
-        .angle_step = angle_step,
-    };
-    short_circuit_apply(&drive->fast, &in);
+    open_switch_t found = OPEN_SWITCH_NONE;
+    if (is_searched(&drive->fast)) {
+        found = search(drive, sample, angle_step, rotation);
+    } else {
+        open_switch_reset(&drive->fast.short_circuit.open_switch);
+    }
+    short_circuit_apply(&drive->fast, upper, found);
 }
 
 void short_circuit_end(fast_state_t *fast)

@@ -6,8 +6,7 @@
  *   circuit: a switch of the other side is shorted, and switching on against it short-circuits the dc link. The other
  *   side is then tried, on which the shorted switch does no harm. If the drivers end that one, too, switching stays
  *   disabled. The task chooses the first side (safety/short_side.h). Where a switch of that side does not switch on
- *   (safety/open_switch.h), the side is changed. Neither applies once the
- *   drivers have ended one side.
+ *   (safety/open_switch.h), the side is changed. Neither applies once the drivers have ended one side.
  *   While the fault line is active nothing can be switched on; this does not count as a failure of a side.
  *   After a fault the currents may have any value, and a short circuit would rotate their flux about the origin. For
  *   half a step of the task switching is therefore disabled first, and the dc link opposes the currents. This wait is
@@ -20,18 +19,11 @@
  * Context  fast ISR, in every period of the short circuit */
 #include "drive/drive.h"
 
-typedef struct {
-    bool upper; /* the side that the task has chosen */
-    open_switch_config_t open_switch;
-    abc_q15_t i;        /* of this sample */
-    ab_q15_t psi;       /* flux at these currents */
-    int32_t angle_step; /* of the field since the period before, 2^32 = one turn */
-} short_circuit_in_t;
-
-/** angle_step: of the field since the period before, 2^32 = one turn. */
-void short_circuit_step(drive_t *drive, const sample_t *sample, bool upper, int32_t angle_step);
-/** The same with given inputs. */
-void short_circuit_apply(fast_state_t *fast, const short_circuit_in_t *in);
+/** angle_step: of the field since the period before, 2^32 = one turn; rotation: cosine, sine of the sample's angle. */
+void short_circuit_step(drive_t *drive, const sample_t *sample, bool upper, int32_t angle_step, fx_pair_t rotation);
+/** The same without the search. upper: the side that the task has chosen; found: the switch that the search has found
+ * in this period. */
+void short_circuit_apply(fast_state_t *fast, bool upper, open_switch_t found);
 
 /** While the bridge runs: after the next fault switching is disabled for so many periods before a short circuit. */
 void short_circuit_prepare(fast_state_t *fast, uint32_t periods);

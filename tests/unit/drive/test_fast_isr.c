@@ -219,13 +219,9 @@ void test_the_task_may_request_the_short_circuit_by_the_upper_switches(void)
 /* One period of a short circuit in which phase a only conducts in this direction; a turn has twenty. */
 static void short_one_sided(int32_t i_a)
 {
-    const short_circuit_in_t in = {
-        .open_switch = {.i_min = 100, .i_max = 1000, .psi_min = 1000},
-        .i = {i_a, -i_a / 2, -i_a / 2},
-        .angle_step = INT32_MAX / 10,
-    };
+    const sample_t sample = {.i_ab = fx_pair(i_a, 0), .point.i = {i_a, 0}};
     seam.log[0] = '\0';
-    short_circuit_apply(&drive.fast, &in);
+    short_circuit_step(&drive, &sample, false, INT32_MAX / 10, fx_pair(Q15(0.999), 0));
 }
 
 /* Current out of the bridge by the lower switches, then into it by the upper ones, which ends the wait for a reset. */

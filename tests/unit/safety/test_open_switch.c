@@ -9,8 +9,9 @@
 #define I_MIN 200
 #define I_MAX 20000
 #define PSI_MIN 8000
+#define SMALL (100 * 100) /* square of a small current */
 
-static const open_switch_config_t config = {.i_min = I_MIN, .i_max = I_MAX, .psi_min = PSI_MIN, .sum_max = 1500};
+static const open_switch_config_t config = {.i_min = I_MIN, .i_max = I_MAX, .psi_min = PSI_MIN};
 static open_switch_state_t state;
 
 void setUp(void)
@@ -22,31 +23,33 @@ void tearDown(void)
 {
 }
 
-static int32_t angle_of(double turns)
+static uint32_t q16_of(double turns)
 {
-    return (int32_t)(int64_t)llround(turns * 4294967296.0);
+    return (uint32_t)lround(turns * 65536.0);
 }
 
-/* Phase currents around a constant part in phase x, and this flux. */
+/* Phase currents around a constant part in phase x. The vector's magnitude is that of both parts. */
 static open_switch_in_t sample(double turns_at, double amplitude, int x, double constant, bool upper)
 {
     double i[3];
     for (int k = 0; k < 3; k++) {
         i[k] = amplitude * cos((turns_at - k / 3.0) * TURN) + ((k == x) ? constant : -0.5 * constant);
     }
+    const double alpha = i[0], beta = (i[1] - i[2]) / sqrt(3.0);
     return (open_switch_in_t){.i = {(int32_t)lround(i[0]), (int32_t)lround(i[1]), (int32_t)lround(i[2])},
+                              .i_squared_q30 = (int32_t)lround(alpha * alpha + beta * beta),
                               .upper = upper};
 }
 
-/* Periods until something is found in a short circuit whose flux does not change; at most two turns. */
+/* Periods until something is found; at most two turns. */
 static int periods_until_found(double turns_per_period, double amplitude, int x, double constant, bool upper,
                                open_switch_t *found)
 {
     const int most = (int)(2.0 / fabs(turns_per_period));
     for (int n = 1; n <= most; n++) {
         open_switch_in_t in = sample(n * turns_per_period, amplitude, x, constant, upper);
-        in.angle_step = angle_of(turns_per_period);
-        *found = open_switch_step(&config, &state, &in);
+        in.step_q16 = q16_of(fabs(turns_per_period));
+        *found = open_switch_by_currents(&config, &state, &in);
         if (*found != OPEN_SWITCH_NONE) {
             return n;
         }
@@ -90,6 +93,7 @@ void test_a_current_above_i_min_in_the_blocked_direction_begins_the_turn_anew(vo
     TEST_ASSERT_NOT_EQUAL_INT(0, periods_until_found(0.05, 5000.0, 1, 4900.0, false, &found));
 }
 
+/* 150 cos + 160 has a magnitude of 310 at most, 1000 cos + 1100 of 100 at least, but only for a moment. */
 void test_currents_below_twice_i_min_are_not_counted(void)
 {
     open_switch_t found;
@@ -99,15 +103,21 @@ void test_currents_below_twice_i_min_are_not_counted(void)
     TEST_ASSERT_NOT_EQUAL_INT(0, periods_until_found(0.05, 1000.0, 2, 1100.0, false, &found));
 }
 
-static open_switch_t with_flux(double alpha, double beta, bool upper, int32_t largest_current)
+/* A sample whose currents are not plausible changes nothing. */
+void test_currents_that_are_not_plausible_are_not_counted(void)
 {
-    const open_switch_in_t in = {
-        .i = {largest_current, -largest_current / 2, -largest_current / 2},
-        .psi = {(int32_t)lround(alpha), (int32_t)lround(beta)},
-        .angle_step = angle_of(0.05),
-        .upper = upper,
-    };
-    return open_switch_step(&config, &state, &in);
+    open_switch_in_t in = {.i = {5000, -2500, -2500}, .i_squared_q30 = 5000 * 5000, .step_q16 = q16_of(0.05)};
+    for (int n = 0; n < 30; n++) {
+        in.i_squared_q30 = (n % 2 == 0) ? 5000 * 5000 : OPEN_SWITCH_NOT_PLAUSIBLE;
+        TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, open_switch_by_currents(&config, &state, &in));
+    }
+    TEST_ASSERT_UINT16_WITHIN(15, 15 * q16_of(0.05), state.one_sided_q16[0]);
+}
+
+static open_switch_t with_flux(double alpha, double beta, int32_t i_squared_q30)
+{
+    const ab_q15_t psi = {(int32_t)lround(alpha), (int32_t)lround(beta)};
+    return open_switch_by_flux(&config, &state, psi, i_squared_q30, q16_of(0.05));
 }
 
 /* The voltage of the phase without its switch adds flux in the direction of this phase. */
@@ -115,82 +125,70 @@ void test_flux_that_has_been_added_shows_the_side_of_the_open_switch(void)
 {
     for (int x = 0; x < 3; x++) {
         for (int sign = -1; sign <= 1; sign += 2) {
-            for (int upper = 0; upper <= 1; upper++) {
-                setUp();
-                const double c = sign * cos(x * TURN / 3.0), s = sign * sin(x * TURN / 3.0);
-                TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(12000.0, -9000.0, upper, 100));
-                TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(12000.0 + 4000 * c, -9000.0 + 4000 * s, upper, 100));
-                TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(12000.0 + 7990 * c, -9000.0 + 7990 * s, upper, 100));
-                TEST_ASSERT_EQUAL((sign > 0) ? OPEN_SWITCH_LOWER : OPEN_SWITCH_UPPER,
-                                  with_flux(12000.0 + 8010 * c, -9000.0 + 8010 * s, upper, 100));
-            }
+            setUp();
+            const double c = sign * cos(x * TURN / 3.0), s = sign * sin(x * TURN / 3.0);
+            TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(12000.0, -9000.0, SMALL));
+            TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(12000.0 + 4000 * c, -9000.0 + 4000 * s, SMALL));
+            TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(12000.0 + 7990 * c, -9000.0 + 7990 * s, SMALL));
+            TEST_ASSERT_EQUAL((sign > 0) ? OPEN_SWITCH_LOWER : OPEN_SWITCH_UPPER,
+                              with_flux(12000.0 + 8010 * c, -9000.0 + 8010 * s, SMALL));
         }
     }
 }
 
-/* Beyond i_max the tables do not have the flux: neither that sample nor the difference to the next one counts. */
+/* Beyond i_max the tables do not have the flux: the next sample within it is the first of another sum. */
 void test_the_sum_begins_anew_after_a_current_beyond_i_max(void)
 {
-    (void)with_flux(0.0, 0.0, false, I_MAX);
-    TEST_ASSERT_EQUAL(OPEN_SWITCH_LOWER, with_flux(8001.0, 0.0, false, I_MAX));
+    (void)with_flux(0.0, 0.0, I_MAX * I_MAX);
+    TEST_ASSERT_EQUAL(OPEN_SWITCH_LOWER, with_flux(8001.0, 0.0, I_MAX * I_MAX));
     setUp();
-    (void)with_flux(0.0, 0.0, false, 100);
-    (void)with_flux(5000.0, 0.0, false, 100);
-    TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(9000.0, 0.0, false, I_MAX + 1));
-    TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(14000.0, 0.0, false, 100));
-    TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(22000.0, 0.0, false, 100));
-    TEST_ASSERT_EQUAL(OPEN_SWITCH_LOWER, with_flux(22001.0, 0.0, false, 100));
+    (void)with_flux(0.0, 0.0, SMALL);
+    (void)with_flux(5000.0, 0.0, SMALL);
+    TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(9000.0, 0.0, I_MAX * I_MAX + 1));
+    TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(14000.0, 0.0, SMALL));
+    TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(22000.0, 0.0, SMALL));
+    TEST_ASSERT_EQUAL(OPEN_SWITCH_LOWER, with_flux(22001.0, 0.0, SMALL));
+    setUp();
+    (void)with_flux(0.0, 0.0, SMALL);
+    TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(9000.0, 0.0, OPEN_SWITCH_NOT_PLAUSIBLE));
+    TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(9000.0, 0.0, SMALL));
 }
 
-/* A sensor that is stuck at 5000: the sum of the three is above 1500 in almost every period. */
-void test_currents_that_do_not_add_up_are_not_counted(void)
-{
-    for (int n = 0; n < 200; n++) {
-        open_switch_in_t in = sample(0.05 * n, 5000.0, 0, 0.0, false);
-        in.i.c = 5000;
-        in.angle_step = angle_of(0.05);
-        in.psi.alpha = 400 * (n % 50);
-        const int32_t sum = in.i.a + in.i.b + in.i.c;
-        const open_switch_t found = open_switch_step(&config, &state, &in);
-        TEST_ASSERT_TRUE(found == OPEN_SWITCH_NONE || (sum >= -1500 && sum <= 1500));
-    }
-    setUp();
-    open_switch_in_t in = {.i = {5000, -1750, -1750}, .angle_step = angle_of(0.05)};
-    for (int n = 0; n < 30; n++) {
-        TEST_ASSERT_EQUAL(n < 20 ? OPEN_SWITCH_NONE : OPEN_SWITCH_LOWER, open_switch_step(&config, &state, &in));
-    }
-    setUp();
-    in.i.c = -1749;
-    for (int n = 0; n < 30; n++) {
-        TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, open_switch_step(&config, &state, &in));
-    }
-}
-
-/* The resistance changes the flux of a complete short circuit slowly. A turn has 20 periods: 20 * 150 is below psi_min,
+/* The resistance changes the flux of a complete short circuit slowly. A turn has 20 samples: 20 * 150 is below psi_min,
  * and 18 * 450 above it. */
 void test_the_sum_begins_anew_after_a_turn(void)
 {
     for (int n = 0; n < 200; n++) {
-        TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(20000.0 - 150.0 * n, 0.0, false, 5000 * ((n % 4 < 2) ? 1 : -1)));
+        TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(20000.0 - 150.0 * n, 0.0, SMALL));
     }
     setUp();
     int n = 0;
-    while (n < 100 && with_flux(30000.0 - 450.0 * n, 0.0, true, 5000 * ((n % 4 < 2) ? 1 : -1)) == OPEN_SWITCH_NONE) {
+    while (n < 100 && with_flux(30000.0 - 450.0 * n, 0.0, SMALL) == OPEN_SWITCH_NONE) {
         n++;
     }
     TEST_ASSERT_EQUAL_INT(18, n);
 }
 
+void test_a_reset_begins_both_searches_anew(void)
+{
+    const open_switch_in_t in = {.i = {5000, -2500, -2500}, .i_squared_q30 = 5000 * 5000, .step_q16 = q16_of(0.9)};
+    for (int n = 0; n < 4; n++) {
+        TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, open_switch_by_currents(&config, &state, &in));
+        TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, with_flux(9000.0 * n, 0.0, SMALL));
+        open_switch_reset(&state);
+    }
+}
+
 void test_flux_and_angles_saturate(void)
 {
-    (void)with_flux(-32768.0, -32768.0, false, 0);
-    (void)with_flux(32767.0, 32767.0, false, 0);
-    TEST_ASSERT_EQUAL_INT(32767, state.sum_alpha);
-    TEST_ASSERT_EQUAL_INT(32767, state.sum_beta);
-    const open_switch_in_t in = {.i = {5000, -2500, -2500}, .angle_step = INT32_MIN};
+    (void)with_flux(-32768.0, -32768.0, 0);
+    TEST_ASSERT_EQUAL(OPEN_SWITCH_LOWER, with_flux(32767.0, 32767.0, 0));
+    setUp();
+    (void)with_flux(32767.0, 32767.0, 0);
+    TEST_ASSERT_EQUAL(OPEN_SWITCH_UPPER, with_flux(-32768.0, -32768.0, 0));
+    const open_switch_in_t in = {.i = {5000, -2500, -2500}, .i_squared_q30 = 5000 * 5000, .step_q16 = 65536};
     for (int n = 0; n < 5; n++) {
-        (void)open_switch_step(&config, &state, &in);
-        TEST_ASSERT_LESS_OR_EQUAL_UINT16(65535, state.one_sided_q16[0]);
+        (void)open_switch_by_currents(&config, &state, &in);
+        TEST_ASSERT_EQUAL_UINT16(65535, state.one_sided_q16[0]);
     }
-    TEST_ASSERT_EQUAL_UINT16(65535, state.one_sided_q16[0]);
 }
