@@ -175,7 +175,7 @@ static void count_in_short_side(drive_t *drive, const snapshot_t *snapshot, cons
 static void update_short_side(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
 {
     const uint32_t half_step = drive->period.periods_per_step / 2U;
-    const sample_t *before = sample_box_at(&drive->samples, drive->samples.generation - half_step);
+    const sample_t *before = sample_box_at(&drive->samples, snapshot->generation - half_step);
     if (before->acting) {
         count_in_short_side(drive, snapshot, before, in_phases(drive->task.i_ref, before->theta_e));
     }

@@ -212,6 +212,7 @@ static void take_snapshot(const drive_t *drive, snapshot_t *snapshot)
         snapshot->shorted = drive_is_shorted(drive);
         exchange_barrier();
     } while (drive->samples.generation != generation);
+    snapshot->generation = generation;
     snapshot->gates = hal_pwm_gates();
     snapshot->angle_absolute = hal_angle_is_absolute();
     snapshot->inverter_dC = hal_temperature_inverter_dC();
