@@ -134,16 +134,16 @@ void mrai_step(const mrai_config_t *config, const mrai_schedule_t *schedule, mra
     begin_period(schedule, state, &in->u, psi, now, half);
 }
 
-/* The step of a state without error changes no parameter, because its innovations are zero, and leaves in e the flux
- * that the terms of the next error begin with: without it they are those of an observer that has just started. */
-FX_COLD void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
-                        const operating_point_t *in)
+/* Without an error before it the step changes no parameter: its innovations are zero. */
+FX_COLD void mrai_start_before_step(mrai_state_t *state)
 {
     state->e_d_q27 = 0;
     state->e_q_q27 = 0;
-    state->predicted_d_q27 = 0;
-    state->predicted_q_q27 = 0;
-    mrai_step(config, schedule, state, in);
+}
+
+/* The step has left in e the flux that the terms of the next error begin with. */
+FX_COLD void mrai_start_after_step(mrai_state_t *state)
+{
     state->predicted_d_q27 -= state->e_d_q27;
     state->predicted_q_q27 -= state->e_q_q27;
     state->e_d_q27 = 0;

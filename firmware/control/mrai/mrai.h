@@ -67,11 +67,12 @@ typedef struct {
 } mrai_state_t;
 
 motor_check_t mrai_check(const mrai_config_t *config);
-/** Sets the observer error to 0 at this sample; the identified parameters are kept. */
-void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
-                const operating_point_t *in);
 void mrai_step(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
                const operating_point_t *in);
+/** Before and after the step of the sample at which the observer starts: the error is then 0, the identified parameters
+ * are as before. */
+void mrai_start_before_step(mrai_state_t *state);
+void mrai_start_after_step(mrai_state_t *state);
 
 /** The identified flux, rounded; its limits prevent an overflow. */
 static inline int32_t mrai_psi_delta_q15(const mrai_state_t *state)
