@@ -40,7 +40,7 @@ static inline void follow(rotating_flux_t *rotating, dq_q15_t to, int32_t psi_ma
 {
     dq_q15_t left = {to.d - rotating->psi.d, to.q - rotating->psi.q};
     const int32_t at_once = rotating->behind ? psi_magnet >> REACHED_SHIFT : psi_magnet - (psi_magnet >> 2);
-    const int shift = 1 + rotating->behind;
+    const int shift = rotating->behind ? 2 : 1;
     rotating->behind = is_beyond(left.d, at_once) || is_beyond(left.q, at_once);
     if (rotating->behind) {
         to.d -= left.d >> shift;
