@@ -55,7 +55,8 @@ COLUMNS = ("instructions", "cycles", "least", "most")  # of a recording; the las
 
 def _row(runs: NDArray[np.int64], reactions: NDArray[np.int64]) -> FIGURES:
     spreads = {name: _spread(runs[:, k], reactions[:, k]) for k, name in enumerate(COLUMNS)}
-    return {"runs": len(runs), **spreads}
+    at_most = {"driving": int(runs[:, 1].max()), "reacting": int(reactions[:, 1].max(initial=0))}
+    return {"runs": len(runs), **spreads, "cycles_at_most": at_most}
 
 
 def _mode(

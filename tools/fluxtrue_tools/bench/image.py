@@ -39,7 +39,7 @@ WARM_UP_MS: Final = 20
 # What a drive reacts to, while it makes torque: over-voltage, one phase current beyond the trip, and an interrupt.
 FAULTS: Final = {"plant.vdc_V": 520.0, "plant.current_gain_a": 20.0}
 GATE_DRIVER: Final = "the gate driver"
-FAULT_TORQUE, FAULT_RPM = 80.0, 3000.0
+FAULT_TORQUE, FAULT_RPM = 80.0, 8000.0
 FAULT_RAMP_MS: Final = 100
 REACTION_MS: Final = 5
 # Milliseconds, requested torque, speed in rpm at the end, dc voltage.

@@ -2,7 +2,7 @@
 """Whether a port suits a machine: its timer must make the period and the dead time, its processor the PWM frequency.
 
 The limits of a port are in its budget.toml. The cost of its interrupts is measured (docs/performance.json, emulated);
-the maxima of all interrupts are added up.
+the maxima of all interrupts are added up, those while driving and those while reacting to a fault each by themselves.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ MEASURED = ROOT / "docs" / "performance.json"
 COMMAND_HZ = 100
 WORK, TASK, CAN = "10 kHz work", "1 kHz task", "CAN ISR"  # rows of performance.json; the work is that of a period
 MAXIMUM = 2  # after minimum and average
+STATES = ("driving", "reacting")  # to a fault: no interrupt is in both at once
 
 
 class Inverter(BaseModel):
@@ -69,11 +70,12 @@ def busy_share(built: Built, core_hz: float, measured: dict[str, Any]) -> float:
     tasks_hz = pwm_hz / periods_per_step(pwm_hz)
     law = _cycles_of_turning_law(measured) if built.is_turning else 0.0
 
-    def cycles_per_s(runs: dict[str, Any]) -> float:
-        cycles = {name: float(runs[name]["cycles"][MAXIMUM]) for name in (WORK, TASK, CAN)}
+    def cycles_per_s(runs: dict[str, Any], state: str) -> float:
+        cycles = {name: float(runs[name]["cycles_at_most"][state]) for name in (WORK, TASK, CAN)}
         return pwm_hz * (cycles[WORK] + law) + tasks_hz * cycles[TASK] + COMMAND_HZ * cycles[CAN]
 
-    return max(cycles_per_s(drive["runs"]) for drive in measured["drives"].values()) / core_hz
+    drives = measured["drives"].values()
+    return max(cycles_per_s(drive["runs"], state) for drive in drives for state in STATES) / core_hz
 
 
 def _check_timer(pwm_hz: float, dead_time_s: float, pwm: Pwm, port: str) -> None:
