@@ -119,12 +119,13 @@ def _picture(_: object, path: Path) -> None:
     path.write_bytes(b"a picture")
 
 
-def _pictures(*given: object) -> None:
-    """Those of a motor's report take five; the last argument is the folder."""
+def _pictures(*given: object) -> tuple[str, ...]:
+    """Those of a motor's report take five; the last argument is the folder. Returns what was drawn."""
     folder = given[-1]
     assert isinstance(folder, Path)
     for name in PLOTS:
         (folder / name).write_bytes(b"a picture")
+    return tuple(PLOTS)
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -69,7 +69,9 @@ BAD = [
     ({"inverter": {"device_drop_V": 9.0}, "machine": {}}, None),  # 9 V of 350 V: allowed
     ({"machine": {"ld_H": 0.0}}, ["machine.ld_H = 0.0", "above 0 up to 1"]),
     ({"inverter": {"min_pulse_s": -1.0}}, ["inverter.min_pulse_s = -1.0", "from 0 to 2e-05"]),
-    ({"machine": {"flux_map": '""'}}, ["machine.flux_map = ''", "1 to 255 characters"]),
+    ({"machine": {"flux_map": '""'}}, ["machine.flux_map = ''", "1 to 255 printable characters"]),
+    ({"machine": {"flux_map": "'maps\\map.csv'"}}, ["machine.flux_map = 'maps", "printable characters without \\"]),
+    ({"machine": {"flux_map": '"\\u0000"'}}, ["machine.flux_map = ", "1 to 255 printable characters"]),
     ({"machine": {"r_ohm": "9" * 400}}, ["machine.r_ohm = 999", "...", "from 1e-05 to 100"]),
 ]
 

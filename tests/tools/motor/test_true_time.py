@@ -96,6 +96,7 @@ COUNTS = {
     "EXCESS_STEPS": "steps, as docs/theory/torque-loop.md says",
     "SWING_STEPS": "steps of the damping, as docs/theory/commissioning.md says",
     "MOVING_STEPS": "steps, as docs/theory/monitors.md says",
+    "EARLY_STEPS": "steps, as that page says",
     "NOISE_MAX": "share of a threshold",
     "REFERENCE_STEPS": "steps, as that page says",
     "ZERO_STEPS": "steps, as that page says",

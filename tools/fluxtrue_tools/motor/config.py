@@ -34,7 +34,7 @@ class Machine(Strict):
     inertia_kgm2: Annotated[float, Field(ge=1e-9, le=1000)]
     iron_loss_hysteresis: Annotated[float, Field(ge=0, le=1e4)] = 0.0
     iron_loss_eddy: Annotated[float, Field(ge=0, le=1e3)] = 0.0
-    flux_map: Annotated[str, Field(min_length=1, max_length=255)] | None = None
+    flux_map: Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f\\]{1,255}$")] | None = None
     ld_H: Annotated[float, Field(gt=0, le=1)] | None = None
     lq_H: Annotated[float, Field(gt=0, le=1)] | None = None
     psi_f_Vs: Annotated[float, Field(gt=0, le=100)] | None = None
@@ -144,7 +144,8 @@ class MotorConfig(Strict):
         return self.omega_max_rad_s > ANGLE_TURNING * self.inverter.pwm_hz
 
 
-NAME_ALLOWED = {"machine.name": "1 to 48 letters, digits, spaces or _ . + -", "machine.flux_map": "1 to 255 characters"}
+NAME_ALLOWED = {"machine.name": "1 to 48 letters, digits, spaces or _ . + -",
+                "machine.flux_map": "1 to 255 printable characters without \\"}  # fmt: skip
 
 
 def complaint(error: ValidationError) -> str:
