@@ -84,7 +84,7 @@ typedef enum {
 typedef struct {
     short_circuit_side_t side;
     bool holds;         /* the short circuit is on, as read back */
-    bool is_found;      /* the side has been changed because of a switch that does not switch on */
+    uint8_t changes;    /* of the side, because a switch does not switch on, since the bridge last ran */
     uint8_t waits;      /* periods with switching disabled that come before it, (SS-21) */
     bool searches_flux; /* the flux is searched in every second period */
     open_switch_state_t open_switch;

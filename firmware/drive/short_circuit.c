@@ -7,6 +7,7 @@
 #include "types/faults.h"
 
 #define AT_ONCE (FAULT_OVER_VOLTAGE | FAULT_GATE)
+#define CHANGES_MAX 2U /* the first may have been without need: a constant part of the currents looks the same */
 #define DUTY_MIDDLE 16384U
 #define DUTY_UPPER 32768U
 
@@ -59,12 +60,13 @@ static open_switch_t search(drive_t *drive, const sample_t *sample, int32_t angl
 
 static short_circuit_side_t without_open_switch(short_circuit_t *state, bool upper, open_switch_t found)
 {
-    if (found == ((state->side == SHORT_CIRCUIT_UPPER) ? OPEN_SWITCH_UPPER : OPEN_SWITCH_LOWER)) {
+    if (state->changes < CHANGES_MAX &&
+        found == ((state->side == SHORT_CIRCUIT_UPPER) ? OPEN_SWITCH_UPPER : OPEN_SWITCH_LOWER)) {
         open_switch_reset(&state->open_switch);
-        state->is_found = true;
+        state->changes++;
         return (found == OPEN_SWITCH_UPPER) ? SHORT_CIRCUIT_LOWER : SHORT_CIRCUIT_UPPER;
     }
-    if (state->is_found) {
+    if (state->changes != 0U) {
         return state->side;
     }
     return upper ? SHORT_CIRCUIT_UPPER : SHORT_CIRCUIT_LOWER;
@@ -112,7 +114,7 @@ void short_circuit_end(fast_state_t *fast)
 void short_circuit_prepare(fast_state_t *fast, uint32_t periods)
 {
     fast->short_circuit.holds = false;
-    fast->short_circuit.is_found = false;
+    fast->short_circuit.changes = 0;
     fast->short_circuit.waits = (uint8_t)periods;
 }
 
@@ -130,7 +132,12 @@ bool short_circuit_waits(fast_state_t *fast)
 
 void short_circuit_reset(fast_state_t *fast)
 {
-    fast->short_circuit = (short_circuit_t){.side = SHORT_CIRCUIT_LOWER};
+    short_circuit_t *state = &fast->short_circuit;
+    const bool keeps_side = state->changes != 0U && state->side <= SHORT_CIRCUIT_UPPER;
+    *state = (short_circuit_t){
+        .side = keeps_side ? state->side : SHORT_CIRCUIT_LOWER,
+        .changes = keeps_side ? state->changes : 0U,
+    };
 }
 
 bool short_circuit_is_needed(uint32_t faults, safe_t safe)

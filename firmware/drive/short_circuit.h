@@ -6,7 +6,8 @@
  *   circuit: a switch of the other side is shorted, and switching on against it short-circuits the dc link. The other
  *   side is then tried, on which the shorted switch does no harm. If the drivers end that one, too, switching stays
  *   disabled. The task chooses the first side (safety/short_side.h). Where a switch of that side does not switch on
- *   (safety/open_switch.h), the side is changed. Neither applies once the drivers have ended one side.
+ *   (safety/open_switch.h), the side is changed, at most twice until the bridge runs again. Neither applies once the
+ *   drivers have ended one side.
  *   While the fault line is active nothing can be switched on; this does not count as a failure of a side.
  *   After a fault the currents may have any value, and a short circuit would rotate their flux about the origin. For
  *   half a step of the task switching is therefore disabled first, and the dc link opposes the currents. This wait is
@@ -34,7 +35,7 @@ bool short_circuit_waits(fast_state_t *fast);
 /** Ends the short circuit: switching is disabled, and the duties are one half. */
 void short_circuit_end(fast_state_t *fast);
 
-/** Permits both sides again, after the faults have been reset. */
+/** Permits both sides again, after the faults have been reset. A side that the search has found is kept. */
 void short_circuit_reset(fast_state_t *fast);
 
 /** Whether the fault that is latched needs the short circuit. */

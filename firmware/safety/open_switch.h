@@ -16,7 +16,7 @@
  *   The change of side is then unnecessary, and in a bridge without a defect it has no effect.
  * Source   docs/theory/safe-state.md (SS-22), (SS-23)
  * Units    per unit; angles in turns times 2^16
- * Range    every argument; i_min > 0, psi_min > 0; a sample at least every third of a turn
+ * Range    every argument; i_min > 0, psi_min > 0; currents at least every third of a turn, flux twice a turn
  * Rounding flux: 1 LSB q15 per component; angles towards 0, 2^-16 of a turn per sample
  * Errors   none; flux and angles saturate
  * Context  fast ISR, in a short circuit; no division */

@@ -245,6 +245,62 @@ void test_a_switch_that_stays_off_changes_the_side_of_the_short_circuit_until_th
     expect_shorted(true);
 }
 
+/* One period of a short circuit with this flux in the direction of phase a and a small current of changing sign. */
+static void short_with_flux(int32_t psi_a, int32_t zero_q28)
+{
+    static int32_t sign = 1;
+    sign = -sign;
+    const sample_t sample = {
+        .i_ab = fx_pair(100 * sign, 0), .zero_q28 = zero_q28, .point = {.i = {100 * sign, 0}, .flux.psi_d = psi_a}};
+    seam.log[0] = '\0';
+    short_circuit_step(&drive, &sample, false, INT32_MAX / 10, fx_pair(Q15(0.9999), 0));
+}
+
+static void shorted_with_flux(int periods, int32_t psi_a, void (*expect)(void))
+{
+    for (int n = 0; n < periods; n++) {
+        short_with_flux(psi_a, 0);
+        expect();
+    }
+}
+
+static void expect_shorted_by_the_lower_switches(void)
+{
+    expect_shorted(true);
+}
+
+/* The flux is searched in every second period from the second one on. A third change is one too many. */
+void test_flux_that_a_complete_short_circuit_would_keep_changes_the_side_twice_at_most(void)
+{
+    const int32_t psi = seam.motor.safe_state.psi_f;
+    shorted_with_flux(3, 0, expect_shorted_by_the_lower_switches);
+    shorted_with_flux(1, psi, expect_shorted_by_the_upper_switches);
+    shorted_with_flux(3, psi, expect_shorted_by_the_upper_switches);
+    drive.psi_d_error = (q15_t)-psi; /* it belongs to the flux */
+    shorted_with_flux(1, psi, expect_shorted_by_the_lower_switches);
+    drive.psi_d_error = 0;
+    shorted_with_flux(8, psi, expect_shorted_by_the_lower_switches);
+    shorted_with_flux(8, 0, expect_shorted_by_the_lower_switches);
+}
+
+void test_a_side_that_has_been_found_is_kept_when_the_faults_are_reset(void)
+{
+    const int32_t psi = seam.motor.safe_state.psi_f;
+    shorted_with_flux(3, 0, expect_shorted_by_the_lower_switches);
+    shorted_with_flux(1, psi, expect_shorted_by_the_upper_switches);
+    short_circuit_reset(&drive.fast);
+    shorted_with_flux(3, psi, expect_shorted_by_the_upper_switches);
+}
+
+/* The sum of the currents shows that a sensor is wrong or saturated. */
+void test_currents_that_are_not_plausible_change_no_side(void)
+{
+    for (int n = 0; n < 60; n++) {
+        short_with_flux((n % 8) * 4000, INT32_MAX / 2);
+        expect_shorted(true);
+    }
+}
+
 void test_with_a_gate_fault_the_side_is_found_by_trying_alone(void)
 {
     drive.fast.faults = FAULT_GATE;
