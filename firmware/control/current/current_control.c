@@ -32,7 +32,7 @@ static inline int32_t proportional_reference(int32_t weighted, q16_t drop_gain, 
 /* Whether x is outside [-limit, limit]. */
 static inline bool is_beyond(int32_t x, int32_t limit)
 {
-    return (uint32_t)(x + limit) > 2U * (uint32_t)limit;
+    return x > limit || x < -limit;
 }
 
 /* (CC-25) */
