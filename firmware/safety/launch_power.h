@@ -6,7 +6,7 @@
  * the tables give.
  *   p = u.i* - w t, u without the voltage that changes the flux, w from the angles at both ends of the step
  *   m, n: first-order means of p and w, four steps, begun anew when the reference moves
- *   m_0, n_0: m and n when the reference came to a standstill; follow in 4096 steps, with much noise in 8 at first
+ *   m_0, n_0: m and n when the reference came to a standstill; follow in 4096 steps, at first with much noise in 8
  *   r: mean over 16 steps of |p - m| where p - m has changed its sign, else 0, of each step at most 8 |i*| v_1: the
  *   noise of the current sensors; r_0 follows it as m_0 follows m, in the 8 steps to half of r. Until the means have
  *   settled r is a mean over 4 steps and r_0 = r; the first 4 steps after a movement are not counted
