@@ -4,11 +4,12 @@
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from bus_stand import COMMAND_ID, COMMISSION_ID, Stand, bus_stand
 
 from fluxtrue_tools.cli import run as command
-from fluxtrue_tools.commission import bus_turning, hidden, turning
+from fluxtrue_tools.commission import bus_turning, hidden, spin, turning
 from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import turned
@@ -145,16 +146,25 @@ def test_before_the_index_has_passed_only_the_imposed_movement_runs(stand: Stand
     spinning(stand, known)
 
 
-def test_the_gains_of_another_machine_are_refused(tmp_path: Path) -> None:
-    """Along d the inductance of hsm1 is 2.6 times that of this machine: its currents oscillate by 60 A rms."""
+@pytest.mark.parametrize("name", ["linear", "pmasynrm"])
+def test_the_gains_of_another_machine_are_refused(tmp_path: Path, name: str) -> None:
+    """Along d the inductance of hsm1 is 4.5 times that of pmasynrm; linear has other pole pairs, too."""
     motor = motors.load("hsm1")
     known = nameplate_of(hidden.folder_of("hsm1"), motor)
-    with bus_stand(motor, known, tmp_path, (NAME, SEED), connected=False) as stand:
+    with bus_stand(motor, known, tmp_path, (name, SEED), connected=False) as stand:
         wanted = turning.SPEED_SHARE * known.speed_max_rpm * turning.TURN / 60.0
-        with pytest.raises(FluxtrueError, match="the current oscillates .* for the nameplate"):
+        with pytest.raises(FluxtrueError, match="along d did not settle"):
             bus_turning.direction(stand.drive, known, wanted, stand.wired)
         turning.release(stand.drive)
         assert is_off(stand)
+
+
+def test_a_current_that_oscillates_by_more_than_its_level_is_refused() -> None:
+    rows = np.zeros((200, 5))
+    rows[:, 0] = 15.0 + 22.0 * np.sin(np.arange(200))  # 15.6 A rms
+    with pytest.raises(FluxtrueError, match="the current oscillates by 16 A rms .* for the nameplate"):
+        spin._refuse_oscillation([rows], 15.0)
+    spin._refuse_oscillation([rows], 16.0)
 
 
 def test_after_an_early_end_enable_needs_a_new_consent(stand: Stand, known: Nameplate) -> None:

@@ -89,6 +89,7 @@ NOT_COMPARED = {
     "fx_axis",
     "fx_axis_position",
     "fx_cell_at",
+    "fx_leading_zeros",
     "fx_load_pair",
     "fx_rsqrt_normalised",
     "fx_weights",

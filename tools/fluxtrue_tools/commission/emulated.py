@@ -4,8 +4,7 @@
 python -m fluxtrue_tools.commission.emulated --machine saturated --seed 101 --step all
 
 The image is that of a nameplate, as for any unknown motor, with an AS5047P. With the gains of another machine currents
-may oscillate: the inductance of hsm1 along d is 2.6 times that of saturated 101, whose currents oscillate by 60 A rms
-with its gains. A second of the bus takes about a second of a processor.
+may oscillate or not settle. A second of the bus takes about a second of a processor.
 """
 
 import contextlib
