@@ -49,7 +49,7 @@ PARTS = (
     ("mrai", r"firmware/control/mrai/", 100),
     ("safety", r"firmware/safety/", 100),
     ("second_level", r"firmware/second_level/", 95),
-    ("receive", r"firmware/comm/(can_rx|e2e)\.", 100),
+    ("receive", r"firmware/comm/(can_rx|can_take|e2e)\.", 100),
     ("comm", r"firmware/comm/", 95),
     ("drive", r"firmware/drive/", 95),
     ("scope", r"firmware/scope/", 95),

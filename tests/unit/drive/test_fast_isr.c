@@ -292,6 +292,20 @@ void test_a_side_that_has_been_found_is_kept_when_the_faults_are_reset(void)
     shorted_with_flux(3, psi, expect_shorted_by_the_upper_switches);
 }
 
+void test_a_reset_permits_both_sides_where_the_gate_drivers_have_ended_the_one_that_was_found(void)
+{
+    const int32_t psi = seam.motor.safe_state.psi_f;
+    shorted_with_flux(3, 0, expect_shorted_by_the_lower_switches);
+    shorted_with_flux(1, psi, expect_shorted_by_the_upper_switches);
+    seam.gates_blocked = true;
+    short_with_flux(psi, 0);
+    TEST_ASSERT_EQUAL(SHORT_CIRCUIT_LAST_LOWER, drive.fast.short_circuit.side);
+    seam.gates_blocked = false;
+    short_circuit_reset(&drive.fast);
+    TEST_ASSERT_EQUAL(SHORT_CIRCUIT_LOWER, drive.fast.short_circuit.side);
+    TEST_ASSERT_EQUAL(0, drive.fast.short_circuit.changes);
+}
+
 /* The sum of the currents shows that a sensor is wrong or saturated. */
 void test_currents_that_are_not_plausible_change_no_side(void)
 {
