@@ -169,8 +169,44 @@ void test_the_sum_begins_anew_after_a_turn(void)
     TEST_ASSERT_EQUAL_INT(18, n);
 }
 
+/* The bounds themselves: 2 i_min counts, and so does i_min in the direction that the diode blocks. */
+void test_the_bounds_of_a_current_that_counts(void)
+{
+    open_switch_in_t in = {.i = {-I_MIN, I_MIN, -I_MIN - 1}, .i_squared_q30 = 4 * I_MIN * I_MIN, .step_q16 = 100};
+    state = (open_switch_state_t){.one_sided_q16 = {5, 6, 7}};
+    (void)open_switch_by_currents(&config, &state, &in);
+    TEST_ASSERT_EQUAL_UINT16(105, state.one_sided_q16[0]);
+    TEST_ASSERT_EQUAL_UINT16(106, state.one_sided_q16[1]);
+    TEST_ASSERT_EQUAL_UINT16(0, state.one_sided_q16[2]);
+    in.i_squared_q30--;
+    (void)open_switch_by_currents(&config, &state, &in);
+    TEST_ASSERT_EQUAL_UINT16(105, state.one_sided_q16[0]);
+}
+
+void test_a_new_beginning_has_turned_by_nothing(void)
+{
+    state = (open_switch_state_t){.has_begun = true, .turned_q16 = 65535};
+    (void)with_flux(1000.0, 0.0, SMALL);
+    TEST_ASSERT_EQUAL_UINT16(0, state.turned_q16);
+    (void)with_flux(1000.0, 0.0, SMALL);
+    TEST_ASSERT_EQUAL_UINT16(q16_of(0.05), state.turned_q16);
+}
+
+/* Flux across phase a: the s of the two others are equal and opposite, and the decision falls on the upper switches. */
+void test_of_two_equal_sums_the_negative_one_decides(void)
+{
+    (void)with_flux(0.0, 0.0, SMALL);
+    TEST_ASSERT_EQUAL(OPEN_SWITCH_UPPER, with_flux(0.0, 12000.0, SMALL));
+}
+
 void test_a_reset_begins_both_searches_anew(void)
 {
+    state = (open_switch_state_t){.has_begun = true, .one_sided_q16 = {5, 6, 7}};
+    open_switch_reset(&state);
+    TEST_ASSERT_FALSE(state.has_begun);
+    for (int x = 0; x < 3; x++) {
+        TEST_ASSERT_EQUAL_UINT16(0, state.one_sided_q16[x]);
+    }
     const open_switch_in_t in = {.i = {5000, -2500, -2500}, .i_squared_q30 = 5000 * 5000, .step_q16 = q16_of(0.9)};
     for (int n = 0; n < 4; n++) {
         TEST_ASSERT_EQUAL(OPEN_SWITCH_NONE, open_switch_by_currents(&config, &state, &in));
