@@ -245,15 +245,26 @@ void test_a_switch_that_stays_off_changes_the_side_of_the_short_circuit_until_th
     expect_shorted(true);
 }
 
-/* One period of a short circuit with this flux in the direction of phase a and a small current of changing sign. */
-static void short_with_flux(int32_t psi_a, int32_t zero_q28)
+static int32_t psi_f(void)
+{
+    return seam.motor.safe_state.psi_f;
+}
+
+/* One period of a short circuit with a small current of changing sign. Its field turns by a twentieth of a turn. */
+static void short_with(const flux_point_t *flux, fx_pair_t rotation, dq_q15_t i, int32_t zero_q28)
 {
     static int32_t sign = 1;
     sign = -sign;
-    const sample_t sample = {
-        .i_ab = fx_pair(100 * sign, 0), .zero_q28 = zero_q28, .point = {.i = {100 * sign, 0}, .flux.psi_d = psi_a}};
+    const sample_t sample = {.i_ab = fx_pair(100 * sign, 0), .zero_q28 = zero_q28, .point = {.i = i, .flux = *flux}};
     seam.log[0] = '\0';
-    short_circuit_step(&drive, &sample, false, INT32_MAX / 10, fx_pair(Q15(0.9999), 0));
+    short_circuit_step(&drive, &sample, false, INT32_MAX / 10, rotation);
+}
+
+/* The same with this flux in the direction of phase a. */
+static void short_with_flux(int32_t psi_a, int32_t zero_q28)
+{
+    const flux_point_t flux = {.psi_d = psi_a};
+    short_with(&flux, fx_pair(32767, 0), (dq_q15_t){100, 0}, zero_q28);
 }
 
 static void shorted_with_flux(int periods, int32_t psi_a, void (*expect)(void))
@@ -269,23 +280,71 @@ static void expect_shorted_by_the_lower_switches(void)
     expect_shorted(true);
 }
 
-/* The flux is searched in every second period from the second one on. A third change is one too many. */
+/* The flux is searched in the second period, the first in which the short circuit has been on, and in every second one
+ * from there. A third change is one too many. */
 void test_flux_that_a_complete_short_circuit_would_keep_changes_the_side_twice_at_most(void)
 {
-    const int32_t psi = seam.motor.safe_state.psi_f;
-    shorted_with_flux(3, 0, expect_shorted_by_the_lower_switches);
-    shorted_with_flux(1, psi, expect_shorted_by_the_upper_switches);
-    shorted_with_flux(3, psi, expect_shorted_by_the_upper_switches);
-    drive.psi_d_error = (q15_t)-psi; /* it belongs to the flux */
-    shorted_with_flux(1, psi, expect_shorted_by_the_lower_switches);
+    shorted_with_flux(2, 0, expect_shorted_by_the_lower_switches);
+    shorted_with_flux(1, psi_f(), expect_shorted_by_the_lower_switches);
+    shorted_with_flux(1, psi_f(), expect_shorted_by_the_upper_switches);
+    shorted_with_flux(3, psi_f(), expect_shorted_by_the_upper_switches);
+    drive.psi_d_error = (q15_t)-psi_f(); /* it belongs to the flux */
+    shorted_with_flux(1, psi_f(), expect_shorted_by_the_lower_switches);
+    shorted_with_flux(4, psi_f(), expect_shorted_by_the_lower_switches);
     drive.psi_d_error = 0;
-    shorted_with_flux(8, psi, expect_shorted_by_the_lower_switches);
-    shorted_with_flux(8, 0, expect_shorted_by_the_lower_switches);
+    shorted_with_flux(8, psi_f(), expect_shorted_by_the_lower_switches);
+}
+
+void test_half_of_the_magnets_flux_is_the_bound(void)
+{
+    shorted_with_flux(3, 0, expect_shorted_by_the_lower_switches);
+    shorted_with_flux(8, psi_f() * 48 / 100, expect_shorted_by_the_lower_switches);
+    shorted_with_flux(2, psi_f() * 52 / 100, expect_shorted_by_the_upper_switches);
+}
+
+/* A turn has ten searches: 0.055 of the magnet's flux each are found in the tenth, 0.04 never. */
+void test_the_flux_of_a_turn_counts(void)
+{
+    for (int n = 0; n < 60; n++) {
+        short_with_flux(psi_f() * 40 / 1000 * (n / 2) - 20000, 0);
+        expect_shorted(true);
+    }
+    seam_start();
+    int n = 0;
+    for (; n < 60 && drive.fast.short_circuit.side == SHORT_CIRCUIT_LOWER; n++) {
+        short_with_flux(psi_f() * 55 / 1000 * (n / 2) - 20000, 0);
+    }
+    TEST_ASSERT_INT_WITHIN(3, 22, n);
+}
+
+/* In the stator's frame: psi_q of a rotor at 90 degrees, and psi_d of one at 120 degrees, the direction of phase b. */
+void test_the_flux_is_that_of_the_stators_frame(void)
+{
+    const flux_point_t none = {0}, q = {.psi_q = -psi_f()}, d = {.psi_d = psi_f()};
+    const fx_pair_t quarter = fx_pair(0, 32767), third = fx_pair(Q15(-0.5), Q15(SQRT3_HALF));
+    for (int k = 0; k < 2; k++) {
+        seam_start();
+        for (int n = 0; n < 4; n++) {
+            short_with((n < 3) ? &none : (k == 0) ? &q : &d, (k == 0) ? quarter : third, (dq_q15_t){100, 0}, 0);
+        }
+        expect_shorted_by_the_upper_switches();
+    }
+}
+
+/* The tables end at the largest current. 16 periods: after a turn the currents would be one-sided. */
+void test_flux_beyond_the_tables_changes_no_side(void)
+{
+    const int32_t i_max = seam.motor.current_reference.i_max;
+    const flux_point_t none = {0}, much = {.psi_d = psi_f()};
+    for (int n = 0; n < 16; n++) {
+        short_with((n % 8 < 4) ? &none : &much, fx_pair(32767, 0), (dq_q15_t){1, i_max}, 0);
+        expect_shorted(true);
+    }
 }
 
 void test_a_side_that_has_been_found_is_kept_when_the_faults_are_reset(void)
 {
-    const int32_t psi = seam.motor.safe_state.psi_f;
+    const int32_t psi = psi_f();
     shorted_with_flux(3, 0, expect_shorted_by_the_lower_switches);
     shorted_with_flux(1, psi, expect_shorted_by_the_upper_switches);
     short_circuit_reset(&drive.fast);
@@ -294,7 +353,7 @@ void test_a_side_that_has_been_found_is_kept_when_the_faults_are_reset(void)
 
 void test_a_reset_permits_both_sides_where_the_gate_drivers_have_ended_the_one_that_was_found(void)
 {
-    const int32_t psi = seam.motor.safe_state.psi_f;
+    const int32_t psi = psi_f();
     shorted_with_flux(3, 0, expect_shorted_by_the_lower_switches);
     shorted_with_flux(1, psi, expect_shorted_by_the_upper_switches);
     seam.gates_blocked = true;
@@ -306,11 +365,44 @@ void test_a_reset_permits_both_sides_where_the_gate_drivers_have_ended_the_one_t
     TEST_ASSERT_EQUAL(0, drive.fast.short_circuit.changes);
 }
 
+void test_a_reset_forgets_a_side_that_the_task_has_chosen(void)
+{
+    drive.fast.short_circuit.side = SHORT_CIRCUIT_UPPER;
+    short_circuit_reset(&drive.fast);
+    TEST_ASSERT_EQUAL(SHORT_CIRCUIT_LOWER, drive.fast.short_circuit.side);
+}
+
 /* The sum of the currents shows that a sensor is wrong or saturated. */
 void test_currents_that_are_not_plausible_change_no_side(void)
 {
+    const int32_t most = seam.motor.monitor.zero_sequence_max * 8192;
     for (int n = 0; n < 60; n++) {
-        short_with_flux((n % 8) * 4000, INT32_MAX / 2);
+        short_with_flux((n % 8 < 4) ? 0 : psi_f(), most + 8192);
+        expect_shorted(true);
+    }
+    for (int n = 0; n < 4; n++) {
+        short_with_flux((n < 3) ? 0 : psi_f(), most);
+    }
+    expect_shorted_by_the_upper_switches();
+}
+
+/* By the upper switches the diodes conduct into the bridge. */
+void test_the_side_changes_back_where_the_other_one_lacks_a_switch(void)
+{
+    for (int n = 0; n <= 21; n++) {
+        short_one_sided(5000);
+    }
+    expect_shorted_by_the_upper_switches();
+    for (int n = 0; n <= 20; n++) {
+        short_one_sided(-5000);
+    }
+    expect_shorted(true);
+}
+
+void test_a_current_of_the_size_of_none_changes_no_side(void)
+{
+    for (int n = 0; n < 60; n++) {
+        short_one_sided(seam.motor.plausibility.i_dead);
         expect_shorted(true);
     }
 }
