@@ -197,8 +197,33 @@ void test_the_reference_of_the_noise_follows_it_in_4096_steps(void)
         sum += state.noise_q8;
     }
     const double followed = (sum / 2048.0) * (1.0 - exp(-0.5));
-    TEST_ASSERT_DOUBLE_WITHIN(0.15 * followed + 4096.0, followed, state.first_noise_q8);
+    TEST_ASSERT_DOUBLE_WITHIN(0.15 * followed + 512.0, followed, state.first_noise_q8);
     TEST_ASSERT_GREATER_THAN_INT32(256, state.first_noise_q8);
+}
+
+/* Whether a change of m since m_0 counts in a step without power, in which r falls from 8000 to 7500 and r_0, 8000, and
+ * the change are as good as constant. */
+static bool counts(int32_t change)
+{
+    in.i_ref = (dq_q15_t){0, 13107};
+    state = (launch_power_state_t){
+        .i_ref = {0, 13107},
+        .steady = SETTLED + EARLY,
+        .noise_q8 = 8000 * 256,
+        .first_noise_q8 = 8000 * 256,
+        .first_power_q8 = -change * 256,
+    };
+    (void)launch_power_step(&config, &state, &in);
+    return state.wrong != 0U;
+}
+
+/* sqrt(2) hypot(7500, 8000) = 15,508. */
+void test_the_variances_of_both_means_add_up(void)
+{
+    TEST_ASSERT_FALSE(counts(15485));
+    TEST_ASSERT_TRUE(counts(15530));
+    TEST_ASSERT_FALSE(counts(-15485));
+    TEST_ASSERT_TRUE(counts(-15530));
 }
 
 /* A power of one count above its mean is above it, and without any noise r ends at zero. */
