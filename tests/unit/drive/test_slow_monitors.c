@@ -139,3 +139,65 @@ void test_updates_beyond_the_gate_count_for_the_robust_identification_only(void)
                                 slow_monitors_step(&drive, &snapshot) & FAULT_TORQUE);
     }
 }
+
+/* Whether the upper switches are chosen after so many steps in which phase a of the sample half a step before has a
+ * constant part of five times i_dead. The other samples of the step have none. */
+static bool is_upper(q31_t omega, bool acting, uint32_t steps)
+{
+    setUp();
+    snapshot.generation = 100;
+    snapshot.sample.point.omega = omega;
+    snapshot.sample.acting = acting;
+    const int32_t constant = 5 * seam.motor.plausibility.i_dead;
+    drive.samples.slot[95 % SAMPLE_SLOTS] = snapshot.sample;
+    drive.samples.slot[95 % SAMPLE_SLOTS].i_ab += (fx_pair_t)constant; /* alpha */
+    for (uint32_t n = 0; n < steps; n++) {
+        (void)slow_monitors_step(&drive, &snapshot);
+    }
+    return short_side_is_upper(&drive.task.short_side, seam.motor.plausibility.i_dead);
+}
+
+/* Slowly, the second harmonic of a half wave looks constant. */
+void test_the_sample_half_a_step_before_counts_for_the_side_of_a_short_circuit(void)
+{
+    TEST_ASSERT_TRUE(is_upper(Q31(0.3), true, 40));
+    TEST_ASSERT_FALSE(is_upper(Q31(0.3), true, 4));
+    TEST_ASSERT_FALSE(is_upper(Q31(0.3), false, 40));
+    TEST_ASSERT_FALSE(is_upper(Q31(0.02), true, 40));
+}
+
+static bool is_upper_after(bool shorted, uint32_t faults)
+{
+    TEST_ASSERT_TRUE(is_upper(Q31(0.3), true, 40));
+    drive.samples.slot[95 % SAMPLE_SLOTS].acting = false;
+    snapshot.sample.acting = false;
+    snapshot.shorted = shorted;
+    snapshot.faults = faults;
+    (void)slow_monitors_step(&drive, &snapshot);
+    return short_side_is_upper(&drive.task.short_side, seam.motor.plausibility.i_dead);
+}
+
+void test_the_side_is_kept_in_the_short_circuit_and_while_a_fault_is_latched(void)
+{
+    TEST_ASSERT_TRUE(is_upper_after(true, 0));
+    TEST_ASSERT_TRUE(is_upper_after(false, FAULT_ANGLE));
+    TEST_ASSERT_FALSE(is_upper_after(false, 0));
+}
+
+/* Phase a keeps its value while the sum of the others moves. */
+void test_a_stuck_sensor_is_found_in_a_movement_too(void)
+{
+    for (int k = 0; k < 2; k++) {
+        setUp();
+        drive.task.movement.movement = MOVEMENT_SPIN;
+        drive.task.movement.phase = (k == 1) ? MOVEMENT_PHASE_AGREED : MOVEMENT_PHASE_IDLE;
+        uint32_t faults = 0;
+        for (int n = 0; n < 40; n++) {
+            const int32_t moved = (n & 1) ? 600 : 0;
+            snapshot.sample.i_ab = fx_pair(2000 + moved, 0);
+            snapshot.sample.zero_q28 = -moved * 8192;
+            faults |= slow_monitors_step(&drive, &snapshot);
+        }
+        TEST_ASSERT_EQUAL_HEX32(FAULT_CURRENT_STUCK, faults & FAULT_CURRENT_STUCK);
+    }
+}
