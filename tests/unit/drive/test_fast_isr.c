@@ -365,7 +365,7 @@ void test_a_reset_permits_both_sides_where_the_gate_drivers_have_ended_the_one_t
     TEST_ASSERT_EQUAL(0, drive.fast.short_circuit.changes);
 }
 
-void test_a_reset_forgets_a_side_that_the_task_has_chosen(void)
+void test_a_reset_clears_a_side_that_the_task_has_chosen(void)
 {
     drive.fast.short_circuit.side = SHORT_CIRCUIT_UPPER;
     short_circuit_reset(&drive.fast);
