@@ -84,3 +84,27 @@ def test_whatever_a_reader_raises_is_one_message_and_nothing_is_printed(monkeypa
         HalfMade()
     gc.collect()
     assert not printed
+
+
+class _HalfMade:
+    """As asammdf's MDF4 after an error in its constructor: in a cycle, and its end raises."""
+
+    def __init__(self) -> None:
+        self.cycle = self
+
+    def __del__(self) -> None:
+        raise AttributeError("no attribute '_file'")
+
+
+def test_the_end_of_a_half_made_reader_is_not_printed_wherever_the_garbage_collection_has_put_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    printed: list[str] = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda one: printed.append(str(one.exc_value)))
+    with pytest.raises(FluxtrueError, match="not a log"), reading("drive.mf4", "a log"):
+        made = _HalfMade()
+        gc.collect()  # promotes what is in use to the oldest generation
+        del made
+        raise ValueError
+    gc.collect()
+    assert printed == []

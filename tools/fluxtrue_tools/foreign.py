@@ -39,6 +39,6 @@ def _release(error: Exception) -> None:
         while each is not None:
             traceback.clear_frames(each.__traceback__)
             each.__traceback__, each.__context__, each = None, None, each.__context__
-        gc.collect(1)  # what this call has made; a whole collection takes ten times as long
+        gc.collect()  # of every generation: a collection during the reading may have promoted the object
     finally:
         sys.unraisablehook = hook
