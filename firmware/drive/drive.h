@@ -345,6 +345,16 @@ static inline bool drive_is_shorted(const drive_t *drive)
 {
     return drive->fast.short_circuit.holds;
 }
+/** Magnitude of the mean of the three phase currents, q15: those of the machine add up to zero. */
+static inline int32_t drive_mean_of_phases(const sample_t *sample)
+{
+    return fx_abs_q31(sample->zero_q28 >> 13);
+}
+/** False: a current sensor is wrong or saturated. */
+static inline bool drive_currents_add_up(const drive_t *drive, const sample_t *sample)
+{
+    return drive_mean_of_phases(sample) <= drive->motor->monitor.zero_sequence_max;
+}
 /** Share of the speed base below which the rotor counts as standing. */
 #define DRIVE_STANDSTILL Q31(0.002)
 static inline bool drive_stands_still(q31_t omega)

@@ -3,17 +3,12 @@
 
 #define QUARTER_PER_PHASES Q15(0.25 / 1.5) /* a quarter of i_max in the dc link, as power of the three phases */
 
-static int32_t mean_of_phases(const snapshot_t *snapshot)
-{
-    return fx_abs_q31(snapshot->sample.zero_q28 >> 13);
-}
-
 /* Whether the measured currents are the machine's. The current sum of this sample counts, not the latched fault: in the
  * first milliseconds of a short circuit the converters saturate, which latches that fault. */
 static bool currents_valid(const drive_t *drive, const snapshot_t *snapshot)
 {
     return (snapshot->faults & (FAULT_CURRENT_STUCK | FAULT_PHASE_LOST | FAULT_INPUT)) == 0U &&
-           mean_of_phases(snapshot) <= drive->motor->monitor.zero_sequence_max;
+           drive_currents_add_up(drive, &snapshot->sample);
 }
 
 /* With the known speed of the last step. */
@@ -27,7 +22,7 @@ static gate_fault_in_t gate_fault_inputs(const drive_t *drive, const snapshot_t 
         .currents_valid = currents_valid(drive, snapshot),
         .line_emf = safe->line_emf,
         .v_dc = (q15_t)snapshot->sample.v_dc,
-        .zero = mean_of_phases(snapshot),
+        .zero = drive_mean_of_phases(&snapshot->sample),
         .i = snapshot->sample.point.i,
     };
 }

@@ -26,11 +26,6 @@ static bool is_searched(const fast_state_t *fast)
     return fast->short_circuit.holds && (fast->faults & FAULT_GATE) == 0U;
 }
 
-static bool is_plausible(const motor_t *m, const sample_t *sample)
-{
-    return fx_abs_q31(sample->zero_q28 >> 13) <= m->monitor.zero_sequence_max;
-}
-
 /* The flux in every second period only: its sum has no need of every period, the direction of a current has. */
 static open_switch_t search(drive_t *drive, const sample_t *sample, int32_t angle_step, fx_pair_t rotation)
 {
@@ -39,7 +34,8 @@ static open_switch_t search(drive_t *drive, const sample_t *sample, int32_t angl
     const open_switch_config_t config = {m->plausibility.i_dead, m->current_reference.i_max,
                                          (q15_t)(m->safe_state.psi_f / 2)};
     const dq_q15_t i = sample->point.i;
-    const int32_t i_squared_q30 = is_plausible(m, sample) ? i.d * i.d + i.q * i.q : OPEN_SWITCH_NOT_PLAUSIBLE;
+    const bool plausible = drive_currents_add_up(drive, sample);
+    const int32_t i_squared_q30 = plausible ? i.d * i.d + i.q * i.q : OPEN_SWITCH_NOT_PLAUSIBLE;
     const uint32_t step_q16 = (uint32_t)fx_abs_q31(angle_step) >> 16;
     state->searches_flux = !state->searches_flux;
     if (state->searches_flux) {

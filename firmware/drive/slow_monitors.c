@@ -156,11 +156,11 @@ static bool is_second_harmonic_constant(uint64_t turns_q60)
     return part < 1ULL << 56; /* within 1/32 of a turn */
 }
 
-static void count_in_short_side(drive_t *drive, const snapshot_t *snapshot, const sample_t *sample, abc_q15_t i_ref)
+static void count_in_short_side(drive_t *drive, const snapshot_t *snapshot, const sample_t *sample, abc_q15_t i_ref,
+                                bool constant)
 {
-    const uint64_t turns_q60 = turns_of_step_q60(drive, snapshot->sample.point.omega);
     const short_side_in_t in = {
-        .acting = sample->acting && !is_second_harmonic_constant(turns_q60),
+        .acting = sample->acting && !constant,
         .shorted = snapshot->shorted || snapshot->faults != 0U,
         .i = measure_phases(sample->i_ab, sample->zero_q28),
         .i_ref = i_ref,
@@ -174,12 +174,13 @@ static void count_in_short_side(drive_t *drive, const snapshot_t *snapshot, cons
  * step, does not look constant. */
 static void update_short_side(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
 {
+    const bool constant = is_second_harmonic_constant(turns_of_step_q60(drive, snapshot->sample.point.omega));
     const uint32_t half_step = drive->period.periods_per_step / 2U;
     const sample_t *before = sample_box_at(&drive->samples, snapshot->generation - half_step);
     if (before->acting) {
-        count_in_short_side(drive, snapshot, before, in_phases(drive->task.i_ref, before->theta_e));
+        count_in_short_side(drive, snapshot, before, in_phases(drive->task.i_ref, before->theta_e), constant);
     }
-    count_in_short_side(drive, snapshot, &snapshot->sample, phases_ref);
+    count_in_short_side(drive, snapshot, &snapshot->sample, phases_ref, constant);
 }
 
 uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
