@@ -8,7 +8,7 @@
 
 #define HALF_LSB_Q22 64
 #define V_D_MIN Q15(0.7) /* share of the circle that the d axis may always use (CC-11) */
-#define REACHED_SHIFT 4      /* psi_f/16: what is left of a change is made at once (CC-25) */
+#define REACHED_SHIFT 4  /* psi_f/16: what is left of a change is made at once (CC-25) */
 
 /* Two halfwords that lie side by side, by one load. */
 static fx_pair_t pair_of(q15_t low, q15_t high)
@@ -53,9 +53,8 @@ static inline void follow(rotating_flux_t *rotating, dq_q15_t to, int32_t psi_ma
 FX_COLD current_target_t current_control_target(const current_control_config_t *config, const operating_point_t *at,
                                                 int32_t psi_d_error, rotating_flux_t *rotating)
 {
-    const fx_pair_t gains = pair_of(config->setpoint_weight, config->integral_gain);
-    const int32_t weight_q31 = (int32_t)(gains << 16);
-    const int32_t integral_gain = (int32_t)gains >> 16;
+    const int32_t weight_q31 = config->setpoint_weight * 65536;
+    const int32_t integral_gain = config->integral_gain;
     const q16_t drop_gain = config->drop_gain;
     const int32_t weighted_d = weighted_flux(weight_q31, at->flux.psi_d, at->flux.psi_f0);
     const int32_t weighted_q = weighted_flux(weight_q31, at->flux.psi_q, 0);
