@@ -26,7 +26,7 @@ DIVISIONS = {
     "capture.c": 2,  # 1 kHz, armed: rows of a step, and the place of the first
     "trigger.c": 1,  # 1 kHz, when the trigger is found
     "turning_modulate.c": 1,  # the knee, where the field turns far
-    "current_control.c": 1,  # reciprocal of the measured dc voltage
+    "current_control.c": 2,  # reciprocal of the measured dc voltage; 1 kHz: share of the turn left to the setpoint
     "e2e.c": 2,  # 1 kHz: the counter's turn
     "frames.c": 1,  # the same in the second level
     "own_torque.c": 1,  # 1 kHz, second level: a fifth of the torque

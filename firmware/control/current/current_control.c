@@ -60,9 +60,10 @@ FX_COLD current_target_t current_control_target(const current_control_config_t *
     const int32_t weighted_q = weighted_flux(weight_q31, at->flux.psi_q, 0);
     int32_t turn_q31 = at->omega >> 31;
     int32_t rest = 0;
-    if (config->sigma_q24 != 0) { /* with current_control_turning.h only the sign of the speed acts */
+    const int32_t sigma_q16 = config->sigma_q24 >> 8;
+    if (sigma_q16 != 0) { /* with current_control_turning.h only the sign of the speed acts */
         turn_q31 = (at->omega >> 5) * MEASURED_SHARE_Q5;
-        rest = fx_sat_q15_word((at->omega - turn_q31) / (config->sigma_q24 >> 8)); /* Q31/Q16 */
+        rest = fx_sat_q15_word((at->omega - turn_q31) / sigma_q16); /* Q31/Q16 */
     }
     follow(rotating, (dq_q15_t){weighted_d, weighted_q}, at->flux.psi_f0);
     const int32_t with_magnet = fx_sat_q15_word(rotating->psi.d + psi_d_error);
