@@ -14,8 +14,10 @@ from click.testing import CliRunner, Result
 from fluxtrue_tools.bus.interface import Interface, read_interface
 from fluxtrue_tools.bus.scales import dbc_of, standard_factors
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.live.replay import load
 from fluxtrue_tools.log.cli import log
-from fluxtrue_tools.log.decode import attached_interface, signals_of
+from fluxtrue_tools.log.decode import signals_of
+from fluxtrue_tools.log.recording import read_recording
 from fluxtrue_tools.vecu.mdf import BusLog
 
 STATUS = {"Crc": 0, "Counter": 0, "State": 4, "TorqueEstimated": 0.0, "TorqueCommanded": 40.0, "Speed": 2000.0}
@@ -59,7 +61,7 @@ def test_a_recording_is_read_in_the_scale_of_the_dbc_that_is_attached_to_it(tmp_
     servo = _servo()
     path = _recording(tmp_path / "servo.mf4", servo, servo.hash)
     assert signals_of(path)["INV_Status.TorqueEstimated"].iloc[0] == pytest.approx(2.5)
-    assert attached_interface(path).hash == servo.hash != read_interface().hash
+    assert read_recording(path).interface.hash == servo.hash != read_interface().hash
 
 
 def test_a_recording_with_the_dbc_of_another_motor_is_refused(tmp_path: Path) -> None:
@@ -122,3 +124,21 @@ def test_a_recording_of_something_else_under_that_name_is_refused(tmp_path: Path
         recorded.save(path)
     with pytest.raises(FluxtrueError, match=r"other.mf4: not an MDF4 bus log \(no CAN_DataFrame.DataBytes\)"):
         signals_of(path)
+
+
+def test_frames_of_several_buses_come_in_the_order_of_their_times(tmp_path: Path) -> None:
+    with MDF(version="4.10") as both:
+        for first_s in (0.01, 0.0):
+            recorder, one = BusLog(), tmp_path / "one.mf4"
+            for k in range(5):
+                recorder(can.Message(timestamp=first_s + 0.02 * k, arbitration_id=k, data=bytes([k])))
+            recorder.write(one)
+            with MDF(one) as bus:
+                both.append(bus.get("CAN_DataFrame"))
+        both.save(tmp_path / "both.mf4")
+    found = read_recording(tmp_path / "both.mf4")
+    assert list(found.time_s) == pytest.approx([0.01 * k for k in range(10)])
+    assert list(found.ids) == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4] and found.data.shape == (10, 8)
+    played = load(tmp_path / "both.mf4")
+    assert played.times_s == pytest.approx(list(found.time_s))
+    assert [frame.data for frame in played.frames] == [bytes([k]) for k in found.ids]

@@ -5,11 +5,10 @@ What is calculated for a motor is calculated once for everything on which it dep
 that are accepted change neither its tables nor its current references.
 """
 
-import io
+import faulthandler
 import os
 import pickle
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from importlib import import_module
@@ -21,11 +20,11 @@ from typing import Any
 import pytest
 from abused import accepted
 
+from fluxtrue_tools import reader_process
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.bases import Bases
 from fluxtrue_tools.motor.config import Machine
 from fluxtrue_tools.motor.flux_model import FluxModel
-from fluxtrue_tools.motor.map_import import readers
 from fluxtrue_tools.motor.motor import load_motor
 from fluxtrue_tools.motor.names import PLOTS, source_files
 from fluxtrue_tools.motor.references import Solver
@@ -95,18 +94,18 @@ def remembered(function: Function, key: Function) -> Function:
 
 
 def _read_apart(command: list[str], **_: object) -> subprocess.CompletedProcess[bytes]:
-    """The reader of a .mat or .h5 in a process of its own, as arrays.py starts it, but with its packages loaded."""
+    """The process of a reader, as reader_process.py starts it, but with its packages loaded."""
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         child = os.fork()
         if child == 0:
+            faulthandler.disable()  # a crash is one of the results
             code = 1
             try:
-                sys.stdout = io.TextIOWrapper(out)
-                readers.main(Path(command[-1]))
-                sys.stdout.flush()
+                out.write(reader_process.answer(import_module(command[-2]).read, Path(command[-1])))
+                out.flush()
                 code = 0
             except Exception as error:
-                err.write(f"{type(error).__name__}: {error}".encode())
+                err.write(reader_process.reason(error).encode())
                 err.flush()
             finally:
                 os._exit(code)
@@ -144,7 +143,7 @@ def stubs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
             patch.setattr(f"fluxtrue_tools.{place}", load)
         patch.setattr(os, "execv", accepted)
         patch.setattr(os, "execve", accepted)
-        patch.setattr("fluxtrue_tools.motor.map_import.arrays.subprocess", SimpleNamespace(run=_read_apart))
+        patch.setattr("fluxtrue_tools.reader_process.subprocess", SimpleNamespace(run=_read_apart, DEVNULL=None))
         patch.setattr("fluxtrue_tools.motor.map_import.plot.write", _picture)
         patch.setattr("fluxtrue_tools.motor.html.write_plots", _pictures)
         patch.setattr("fluxtrue_tools.motor.measured.measure_loop", lambda _: None)

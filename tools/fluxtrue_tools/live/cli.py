@@ -23,14 +23,13 @@ from fluxtrue_tools.live.bus_process import BusProcess, Setup
 from fluxtrue_tools.live.oscilloscope import Oscilloscope
 from fluxtrue_tools.live.pace import InStep
 from fluxtrue_tools.live.recorder import Recorder
-from fluxtrue_tools.live.replay import Recording, Replay, load
+from fluxtrue_tools.live.replay import Drive, Replay, load
 from fluxtrue_tools.live.samples import Samples
 from fluxtrue_tools.live.server import HOST, make_app
 from fluxtrue_tools.live.session import Session
 from fluxtrue_tools.live.tuning import Tuning
 from fluxtrue_tools.live.words import words
 from fluxtrue_tools.live.xcp import BENCH_ANSWER_S, SIMULATED_ANSWER_S, Xcp
-from fluxtrue_tools.log.decode import attached_interface
 from fluxtrue_tools.motor.config import load_config
 from fluxtrue_tools.sim.build import locate, prepare
 from fluxtrue_tools.vecu.channel import Channel
@@ -45,7 +44,7 @@ class Source:
     interface: Interface
     address: BusAddress | None = None
     channel: Channel | None = None
-    recording: Recording | None = None
+    recording: Drive | None = None
     firmware: Description | None = None
     in_step: bool = False
 
@@ -190,7 +189,7 @@ def live(motor: str, can_interface: str | None, can_channel: str, can_option: tu
     interface = read_interface(built.dbc)
     with contextlib.ExitStack() as stack:
         if replay is not None:
-            source = Source(f"{replay.name} (replay)", attached_interface(replay), recording=recording)
+            source = Source(f"{replay.name} (replay)", recording.interface, recording=recording)
         elif can_interface is not None:
             address = BusAddress(can_interface, can_channel, dict(can_option))
             channel = None if bench is None else Channel(*bench)

@@ -9,25 +9,30 @@ from pathlib import Path
 from typing import Final
 
 import can
-from asammdf import MDF
+import numpy as np
 
+from fluxtrue_tools.bus.interface import Interface, read_interface
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.foreign import reading
 from fluxtrue_tools.live.samples import Samples
 from fluxtrue_tools.live.stand import TRUTH
+from fluxtrue_tools.log.recording import Beside, Recording, read_recording
 
 CHUNK_S: Final = 0.02
 BEFORE_S: Final = 20.0  # what the page draws: a jump fills it
+MDF4: Final = ".mf4"
+NOTHING: Final = Beside(np.zeros(0), np.zeros(0), "")
 
 
 @dataclass(frozen=True)
-class Recording:
+class Drive:
     """Frames, and the torque of the simulated machine if there was one; times since the first frame."""
 
     times_s: list[float]
     frames: list[can.Message]
     truth_s: list[float]
     truth_Nm: list[float]
+    interface: Interface
 
     @property
     def length_s(self) -> float:
@@ -35,32 +40,40 @@ class Recording:
         return self.times_s[-1]
 
 
-def load(path: Path) -> Recording:
-    """Everything in a log that a page can show."""
+def load(path: Path) -> Drive:
+    """Everything in a log that a page can show: an MDF4 file, or another format of python-can."""
+    name = f"--replay {path}"
     if not path.is_file():
-        raise FluxtrueError(f"--replay {path}: no such file")
-    with reading(f"--replay {path}", "a readable log"), can.LogReader(path) as reader:
+        raise FluxtrueError(f"{name}: no such file")
+    if path.suffix.lower() == MDF4:
+        return _of_recording(read_recording(path, name), name)
+    with reading(name, "a readable log"), can.LogReader(path) as reader:
         frames = list(reader)
+    return _drive(frames, name, read_interface())
+
+
+def _drive(frames: list[can.Message], name: str, interface: Interface, truth: Beside = NOTHING) -> Drive:
     if not frames:
-        raise FluxtrueError(f"--replay {path}: holds no frame")
+        raise FluxtrueError(f"{name}: holds no frame")
     begin_s = frames[0].timestamp
-    return Recording([frame.timestamp - begin_s for frame in frames], frames, *_truth(path, begin_s))
+    times_s = [frame.timestamp - begin_s for frame in frames]
+    return Drive(times_s, frames, (truth.time_s - begin_s).tolist(), truth.values.astype(float).tolist(), interface)
 
 
-def _truth(path: Path, begin_s: float) -> tuple[list[float], list[float]]:
-    """Times and values of the true torque; none in a log of another format or of a bench."""
-    try:
-        with MDF(path) as recorded:
-            signal, origin_s = recorded.get(TRUTH), recorded.header.start_time.timestamp()
-    except Exception:  # for other formats the reader raises many kinds of exceptions
-        return [], []
-    return [float(t) + origin_s - begin_s for t in signal.timestamps], [float(value) for value in signal.samples]
+def _of_recording(recording: Recording, name: str) -> Drive:
+    each = zip(recording.time_s.tolist(), recording.ids.tolist(), recording.extended.tolist(),
+               recording.lengths.tolist(), recording.data, strict=True)  # fmt: skip
+    with reading(name, "a readable log"):
+        frames = [can.Message(timestamp=time_s, arbitration_id=number, is_extended_id=extended,
+                              data=data[:length].tobytes(), check=True)
+                  for time_s, number, extended, length, data in each]  # fmt: skip
+    return _drive(frames, name, recording.interface, recording.beside.get(TRUTH, NOTHING))
 
 
 class Replay:
     """Plays a recording to the samples, again and again. Any thread."""
 
-    def __init__(self, recording: Recording, samples: Samples) -> None:
+    def __init__(self, recording: Drive, samples: Samples) -> None:
         self._recording, self._samples = recording, samples
         self._lock = threading.Lock()
         self._position_s = 0.0

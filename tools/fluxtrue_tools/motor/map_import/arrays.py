@@ -5,12 +5,8 @@ scipy, h5py, numpy and json read them; nothing that could run code (pickles, MAT
 """
 
 import gzip
-import io
 import json
 import math
-import os
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -19,8 +15,9 @@ import numpy as np
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
-from fluxtrue_tools.motor.map_import.readers import ROOT
+from fluxtrue_tools.motor.map_import import readers
 from fluxtrue_tools.motor.text_table import SIZE_MAX, check_size
+from fluxtrue_tools.reader_process import arrays_from
 
 Tree = dict[str, Any]
 HDF5, GZIP, ZIP = b"\x89HDF\r\n\x1a\n", b"\x1f\x8b", b"PK"
@@ -53,15 +50,8 @@ def _json(path: Path, packed: bool) -> Tree:
 
 
 def _apart(path: Path) -> Tree:
-    """The arrays of a .mat or .h5, read by a process of its own: a damaged file can crash the readers (readers.py)."""
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "OPENBLAS_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "fluxtrue_tools.motor.map_import.readers", os.fspath(path)]
-    done = subprocess.run(command, capture_output=True, check=False, env=environment, stdin=subprocess.DEVNULL)
-    if done.returncode != 0:
-        said = done.stderr.decode("utf-8", "replace").strip().splitlines()
-        raise ValueError(said[-1] if done.returncode > 0 and said else "the reader crashed")
-    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as flat:
-        return _nested({name: flat[name] for name in flat.files}).get(ROOT, {})
+    """The arrays of a .mat or .h5."""
+    return _nested(arrays_from(readers.__name__, path)).get(readers.ROOT, {})
 
 
 def _nested(flat: dict[str, Any]) -> Tree:
