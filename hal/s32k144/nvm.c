@@ -26,7 +26,7 @@ extern const volatile uint8_t nvm_start[]; /* from the linker script */
 
 /* In SRAM with everything it calls: until the controller has accepted or refused the command, nothing is fetched from
  * the flash by this priority. Bounded; a command that never ends fails. */
-__attribute__((section(".ramfunc"), noinline, long_call)) static uint32_t run_command(void)
+__attribute__((section(".hot"), noinline, long_call)) static uint32_t run_command(void)
 {
     FTFC->FSTAT = FTFC_FSTAT_CCIF;
     for (uint32_t k = 0; k < COMMAND_LOOPS; k++) {

@@ -15,6 +15,8 @@
 extern uint32_t stack_bottom[], stack_top[];
 extern uint32_t data_start[], data_end[], bss_start[], bss_end[];
 extern const uint32_t data_load[];
+extern uint32_t hot_start[], hot_end[]; /* whole blocks of four words */
+extern const uint32_t hot_load[];
 
 int main(void);
 
@@ -78,14 +80,23 @@ __attribute__((naked)) void fault_handler(void)
     __asm__ volatile("ldr r0, =stack_top\n msr msp, r0\n b panic\n" ::"i"(panic));
 }
 
+/* After a reset at speed the bridge waits for this. */
 static void clear_and_copy(void)
 {
     const uint32_t *from = data_load;
     for (uint32_t *to = data_start; to < data_end; to++, from++) {
         *to = *from;
     }
+    from = hot_load;
+    for (uint32_t *to = hot_start; to < hot_end; to += 4, from += 4) {
+        const uint32_t a = from[0], b = from[1], c = from[2], d = from[3];
+        to[0] = a;
+        to[1] = b;
+        to[2] = c;
+        to[3] = d;
+    }
     uint32_t *to = bss_start;
-    for (; bss_end - to >= 4; to += 4) { /* after a reset at speed the bridge waits for this */
+    for (; bss_end - to >= 4; to += 4) {
         to[0] = to[1] = to[2] = to[3] = 0;
     }
     for (; to < bss_end; to++) {

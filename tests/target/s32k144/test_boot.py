@@ -92,8 +92,14 @@ def _sent_messages(parts: build.Parts, elf: Path) -> dict[str, dict[str, object]
     return listener.last
 
 
-def test_a_damaged_table_is_named_on_the_bus(parts: build.Parts, elf: Path, tmp_path: Path) -> None:
-    messages = _sent_messages(parts, damaged(elf, tmp_path / "damaged.elf", "table_g", 100, b"\x01\x00"))
+@pytest.mark.parametrize(("place", "at", "content"), [
+    ("table_g", 100, b"\x01\x00"),
+    ("hot_start", 0, b"\x00\xbf"),  # what is copied to the RAM; nothing executes its first instruction before the check
+])  # fmt: skip
+def test_damage_that_a_start_finds_is_named_on_the_bus(
+    parts: build.Parts, elf: Path, tmp_path: Path, place: str, at: int, content: bytes
+) -> None:
+    messages = _sent_messages(parts, damaged(elf, tmp_path / "damaged.elf", place, at, content))
     assert messages["INV_Status"]["State"] == "fault"
     assert messages["INV_Faults"]["DriveFaults"] == FAULT_CONFIG
     assert messages["INV_Configuration"]["MotorCheck"] == "image_checksum"
@@ -149,7 +155,8 @@ def test_most_of_the_stack_is_never_touched(parts: build.Parts, elf: Path) -> No
         assert untouched > (top - bottom) // 2
 
 
-def test_a_table_that_is_damaged_later_disables_switching(parts: build.Parts) -> None:
+@pytest.mark.parametrize("place", ["table_ref_i_d", "run_command"], ids=["table", "code in RAM"])
+def test_what_is_damaged_later_disables_switching(parts: build.Parts, place: str) -> None:
     motor = parts.emulated()
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.16, "vdc_V": 350.0}
     with Loop(motor.library, plant, motor.flux_map) as loop:
@@ -158,7 +165,7 @@ def test_a_table_that_is_damaged_later_disables_switching(parts: build.Parts) ->
         loop.run(1000)
         assert loop.get("fault_word") == 0
         core = Core.of_simulation(motor.library, loop._sim)
-        address = core.symbol("table_ref_i_d")
+        address = core.symbol(place) & ~1
         byte = core.read(address, 1)[0] ^ 0x01
         assert core._library.emu_write(core._handle, address, bytes([byte]), 1)
         loop.run(1000)

@@ -44,7 +44,7 @@ def _read(elf: Path, address: int, size: int) -> bytes:
 
 def test_the_image_fits_its_bounds_with_the_stack(elf: Path) -> None:
     bounds = budget()
-    print(image.size(elf, bounds["flash_bytes"], bounds["ram_bytes"]))
+    print(image.size(elf, image.Size(*(bounds[f"{name}_bytes"] for name in ("flash", "ram", "ram_code")))))
 
 
 def test_the_vectors_name_the_handlers_and_every_other_entry_is_a_fault(elf: Path) -> None:
@@ -104,10 +104,17 @@ def test_reserved_memory_keeps_its_sectors(elf: Path) -> None:
     assert symbols["nvm_end"] - symbols["nvm_start"] == 32 * 2048
 
 
+def test_the_usual_route_of_the_fast_isr_does_not_wait_for_the_flash(elf: Path) -> None:
+    found = image.Image(elf).symbols
+    symbols = {disassembly.plain(name): address for name, address in found.items()}
+    for name in ("adc_handler", "fast_isr", "current_control_step", "modulate_step", "flux_table_step"):
+        assert symbols["hot_start"] <= symbols[name] < symbols["hot_end"], name
+
+
 def test_flash_commands_are_launched_in_sram(elf: Path) -> None:
     symbols = image.Image(elf).symbols
     assert 0x1FFF_8000 <= symbols["run_command"] < 0x2000_7000
-    assert symbols["data_start"] <= symbols["run_command"] < symbols["data_end"]  # copied there at start-up
+    assert symbols["hot_start"] <= symbols["run_command"] < symbols["hot_end"]  # copied there at start-up
 
 
 def test_no_heap_function_is_linked(elf: Path) -> None:

@@ -47,6 +47,13 @@ def test_frames_add_up_along_the_deepest_path(tmp_path: Path) -> None:
     assert worst(nodes(tmp_path, source), "start") == (72, ("start", "deep"), [])
 
 
+def test_a_jump_to_the_constant_behind_it_is_followed(tmp_path: Path) -> None:
+    """As the linker leads from the flash to code in the RAM."""
+    source = function("start", "push {r4, lr}; bl far; pop {r4, pc}; .balign 4")
+    source += function("far", "ldr.w pc, [pc]; .word deep") + function("deep", "sub sp, #64; add sp, #64; bx lr")
+    assert worst(nodes(tmp_path, source), "start") == (72, ("start", "far", "deep"), [])
+
+
 def test_a_call_counts_at_the_depth_it_is_made_at(tmp_path: Path) -> None:
     source = function("start", "push {lr}; bl deep; sub sp, #100; add sp, #100; pop {pc}")
     source += function("deep", "sub sp, #64; add sp, #64; bx lr")

@@ -98,6 +98,13 @@ def test_calls_tail_calls_and_listed_pointers_cost_what_they_call(tmp_path: Path
     assert unlisted.problems == {"start: a call through a pointer is not listed"}
 
 
+def test_a_jump_to_the_constant_behind_it_is_followed(tmp_path: Path) -> None:
+    """As the linker leads from the flash to code in the RAM."""
+    source = function("start", "push {r4, lr}; bl far; pop {r4, pc}; .balign 4")
+    source += function("far", "ldr.w pc, [pc]; .word large") + function("large", "nop; nop; nop; bx lr")
+    assert worst(image(tmp_path, source)) == 2 + 1 + 4 + 1
+
+
 def test_what_never_returns_is_on_no_path(tmp_path: Path) -> None:
     source = function("start", "cmp r0, #0; bne 1f; bx lr; 1: nop; nop; nop; bl halt") + function("halt", "1: b 1b")
     assert worst(image(tmp_path, source)) == 3

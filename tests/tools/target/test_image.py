@@ -42,17 +42,28 @@ def test_sealing_twice_changes_nothing(elf: Path) -> None:
 
 
 def test_initialised_data_count_in_flash_and_in_ram(elf: Path) -> None:
-    text = image.size(elf, 4096, 4096)
-    flash, ram = (int(part.split()[1]) for part in text.split(": ")[1].split(", "))
-    assert ram == 1000
+    found = image.Size.of(image.Image(elf))
+    assert (found.ram, found.ram_code) == (1000, 0)
+    flash = found.flash
     assert 1012 < flash < 1100  # data, guarded bytes with their checksum, and a few instructions
 
 
 def test_an_image_beyond_its_bounds_is_an_error(elf: Path) -> None:
     with pytest.raises(FluxtrueError, match=r"RAM 1000 of 999 bytes"):
-        image.size(elf, 4096, 999)
+        image.size(elf, image.Size(4096, 999, 0))
     with pytest.raises(FluxtrueError, match=r"of 1000 bytes, RAM"):
-        image.size(elf, 1000, 1000)
+        image.size(elf, image.Size(1000, 1000, 0))
+
+
+def test_code_in_the_ram_is_counted_apart(elf: Path) -> None:
+    (elf.parent / "a.c").write_text(SOURCE + '__attribute__((section(".hot"), used)) void in_ram(void) {}\n')
+    (elf.parent / "a.ld").write_text(SCRIPT.replace("/DISC", ".hot 0x20001000 : AT(0x3000) { *(.hot) }\n  /DISC"))
+    command = [ARM_CC, "-mcpu=cortex-m4", "-nostdlib", "-T", "a.ld", "a.c", "-o", "b.elf"]
+    subprocess.run(command, cwd=elf.parent, check=True)
+    found = image.Size.of(image.Image(elf.parent / "b.elf"))
+    assert found.ram_code > 0
+    with pytest.raises(FluxtrueError, match=rf"code in the RAM {found.ram_code} of 0 bytes"):
+        image.size(elf.parent / "b.elf", image.Size(4096, 4096, 0))
 
 
 def test_what_is_no_image_is_refused_and_left_alone(tmp_path: Path) -> None:

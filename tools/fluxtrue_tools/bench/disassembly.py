@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from fluxtrue_tools.errors import FluxtrueError
@@ -17,20 +17,25 @@ _FUNCTION = re.compile(r"^([0-9a-f]{8}) <(.+)>:$")
 _LINE = re.compile(r"^\s*([0-9a-f]+):\t([0-9a-f ]+?)\s*\t(\S+)(?:\t(.*))?$")
 _TARGET = re.compile(r"(?:^|, )([0-9a-f]+) <")
 _REGISTER_RANGE = re.compile(r"([rsd])(\d+)-[rsd](\d+)")
+_WORD = re.compile(r"^\s*([0-9a-f]+):\t[0-9a-f ]+?\s*\t\.word\t0x([0-9a-f]+)")
+FAR, VENEER = ("ldr", "pc, [pc]"), "_veneer"  # the jump in it, and how its name ends
 _COPY = re.compile(r"\.(lto_priv|constprop|isra|part|cold)(\.\d+)?")
 
 
 @dataclass(frozen=True)
 class Instruction:
-    """One instruction; `target`: where a direct branch goes."""
+    """One instruction; `target`: where a direct branch goes, or one to the constant behind it (`far`)."""
 
     address: int
     size: int
     mnemonic: str
     operands: str = ""
+    far: int | None = None
 
     @property
     def target(self) -> int | None:
+        if self.far is not None:
+            return self.far
         found = _TARGET.search(self.operands)
         return int(found.group(1), 16) if found else None
 
@@ -76,7 +81,16 @@ def parse(text: str) -> list[Function]:
             operands = re.split(r"\s*[@;]", operands or "")[0].strip()
             size = len(code.replace(" ", "")) // 2
             functions[-1].instructions.append(Instruction(int(address, 16), size, mnemonic, operands))
+        elif functions and functions[-1].instructions and (constant := _WORD.match(line)):
+            _lead(functions[-1].instructions, int(constant.group(1), 16), int(constant.group(2), 16))
     return functions
+
+
+def _lead(code: list[Instruction], address: int, constant: int) -> None:
+    """The linker's way from flash to RAM and back: ldr pc with the constant behind it, bit 0 set for Thumb code."""
+    last = code[-1]
+    if (last.bare, last.operands) == FAR and last.address + last.size == address:
+        code[-1] = replace(last, far=constant & ~1)
 
 
 def read(elf: Path) -> list[Function]:

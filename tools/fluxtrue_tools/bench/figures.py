@@ -165,13 +165,15 @@ def measure(folder: Path) -> FIGURES:
             "laws": measure_laws(program),
             "task stages": _spreads(measure_task(build_task(folder / "bench"))),
         },
-        "image": {"flash": whole.flash, "RAM": whole.ram, "stack reserved": whole.stack},
+        "image": {"flash": whole.flash, "RAM": whole.ram, "code in RAM": whole.ram_code,
+                  "stack reserved": whole.stack},
         "modules": {name: list(both) for name, both in sizes.modules(parts.image).items()},
         "control library": sizes.library(parts.image.parent),
         "state": sizes.state(parts.image),
         "stack": {
             "levels": [{"level": u.name, "frame": u.frame, "stack": u.stack,
-                        "path": [disassembly.plain(f) for f in u.path]} for u in uses],
+                        "path": [disassembly.plain(f) for f in u.path if not f.endswith(disassembly.VENEER)]}
+                       for u in uses],
             "total": total, "seen in emulation": deepest,
         },
     }  # fmt: skip

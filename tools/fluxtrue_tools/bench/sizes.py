@@ -15,7 +15,7 @@ from elftools.elf.elffile import ELFFile
 
 from fluxtrue_tools.bench.disassembly import plain
 from fluxtrue_tools.errors import FluxtrueError
-from fluxtrue_tools.target.image import RAM_FROM, Image
+from fluxtrue_tools.target.image import RAM_FROM, Image, Size
 
 NM, SIZE = "arm-none-eabi-nm", "arm-none-eabi-size"
 LIBRARIES = ("fx", "signal", "control")
@@ -27,10 +27,11 @@ _SECTION = re.compile(r"^\.(text|rodata|data|bss)(\S*)\s+(\d+)\s")
 
 @dataclass(frozen=True)
 class Whole:
-    """Of the image: bytes of flash and RAM, the stack included in the latter."""
+    """Of the image, in bytes; the stack is part of the RAM, the code in the RAM is not."""
 
     flash: int
     ram: int
+    ram_code: int
     stack: int
 
 
@@ -44,9 +45,8 @@ def _lines(*command: str) -> list[str]:
 def whole(elf: Path) -> Whole:
     """Flash and RAM as the linker counts them."""
     image = Image(elf)
-    flash = sum(s["sh_size"] for s in image.sections if s["sh_type"] == "SHT_PROGBITS")
-    ram = sum(s["sh_size"] for s in image.sections if s["sh_addr"] >= RAM_FROM)
-    return Whole(int(flash), int(ram), image.symbol("stack_top") - image.symbol("stack_bottom"))
+    size = Size.of(image)
+    return Whole(size.flash, size.ram, size.ram_code, image.symbol("stack_top") - image.symbol("stack_bottom"))
 
 
 def _module(source: str, name: str) -> str:
@@ -76,6 +76,7 @@ def _module(source: str, name: str) -> str:
     return "C library" if path else "constants without a source line"
 
 
+CODE = "tTwW"  # kinds of symbols: what of it lies in the RAM is in the flash, too, from where it is copied
 NAMED = 64  # bytes: variables from here on are listed by name
 
 
@@ -90,7 +91,7 @@ def modules(elf: Path) -> dict[str, tuple[int, int]]:
         if kind in "Nn" or int(address, 16) in seen:
             continue
         seen.add(int(address, 16))
-        if int(address, 16) >= RAM_FROM:
+        if int(address, 16) >= RAM_FROM and kind not in CODE:
             ram[f"variable {plain(name)}" if int(size, 16) >= NAMED else "small variables"] += int(size, 16)
         else:
             flash[_module(source, name)] += int(size, 16)

@@ -128,6 +128,9 @@ class _Walk:
         if name in ("tbb", "tbh"):
             self.tables.append(depth)
             return True
+        if into_pc and target is not None:
+            self._jump(target, depth)
+            return not conditional
         if name == "blx" or (name == "bx" and instruction.operands != "lr") or into_pc:
             self.node.indirect[instruction.address] = depth
         elif name == "bl" and target is not None:

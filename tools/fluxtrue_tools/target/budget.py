@@ -31,6 +31,7 @@ class Budget(Strict):
     core_Hz: Hertz
     flash_bytes: Count
     ram_bytes: Count
+    ram_code_bytes: int = Field(default=0, ge=0)
     busy_share_max: Share
     pwm: Pwm
     level: list[Any] = Field(default_factory=list)

@@ -55,7 +55,8 @@ def size(elf: Path, budget: Path) -> None:
     from fluxtrue_tools.target import image
 
     bounds = budgets.read(budget)
-    click.echo(image.size(elf, bounds.flash_bytes, bounds.ram_bytes))
+    most = image.Size(bounds.flash_bytes, bounds.ram_bytes, bounds.ram_code_bytes)
+    click.echo(image.size(elf, most))
 
 
 @target.command(cls=paths.Command)

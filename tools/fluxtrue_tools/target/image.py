@@ -18,7 +18,7 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.foreign import reading
 from fluxtrue_tools.outputs import atomic
 
-AREAS = ("protected", "vectors", "program")  # a port must seal the first, the motor's data
+AREAS = ("protected", "hot", "vectors", "program")  # a port must seal the first, the motor's data
 RAM_FROM = 0x1000_0000  # everything the linker puts below is flash
 
 
@@ -94,12 +94,28 @@ def seal(path: Path) -> str:
     return f"{path.name}: " + "; ".join(done)
 
 
-def size(path: Path, flash_max: int, ram_max: int) -> str:
+@dataclass(frozen=True)
+class Size:
+    """Bytes of an image: of flash, of RAM with the stack, and of code in the RAM, which its flash holds, too."""
+
+    flash: int
+    ram: int
+    ram_code: int
+
+    @classmethod
+    def of(cls, image: Image) -> Size:
+        """By the sections that are loaded or reserved."""
+        flash = sum(s["sh_size"] for s in image.sections if s["sh_type"] == "SHT_PROGBITS")
+        in_ram = [s for s in image.sections if s["sh_addr"] >= RAM_FROM]
+        code = sum(s["sh_size"] for s in in_ram if s["sh_flags"] & SH_FLAGS.SHF_EXECINSTR)
+        return cls(int(flash), int(sum(s["sh_size"] for s in in_ram) - code), int(code))
+
+
+def size(path: Path, most: Size) -> str:
     """Flash and RAM, against bounds."""
-    sections = Image(path).sections
-    flash = sum(s["sh_size"] for s in sections if s["sh_type"] == "SHT_PROGBITS")
-    ram = sum(s["sh_size"] for s in sections if s["sh_addr"] >= RAM_FROM)
-    text = f"{path.name}: flash {flash} of {flash_max} bytes, RAM {ram} of {ram_max} bytes with the stack"
-    if flash > flash_max or ram > ram_max:
+    found = Size.of(Image(path))
+    text = (f"{path.name}: flash {found.flash} of {most.flash} bytes, RAM {found.ram} of {most.ram} bytes with the "
+            f"stack, code in the RAM {found.ram_code} of {most.ram_code} bytes")  # fmt: skip
+    if found.flash > most.flash or found.ram > most.ram or found.ram_code > most.ram_code:
         raise FluxtrueError(text)
     return text

@@ -130,6 +130,8 @@ class _Builder:
         if name in ("b", "cbz", "cbnz"):
             edges, calls = self._jump(instruction)
             return edges + (follows if name != "b" or conditional else []), calls
+        if name == "ldr" and instruction.far is not None:
+            return self._jump(instruction)
         if stack.ends_function(instruction, name):
             edges, calls = _return(instruction, name)
             return edges + (follows if conditional else []), calls
