@@ -149,7 +149,8 @@ def wrong_rows(draw: Callable[..., Any], good: Rows) -> Rows:
         for row, value in zip(rows, values[by:] + values[:by], strict=True):
             row[column] = value
         return rows
-    number = draw(st.sampled_from([1e3, 1e-3, 10.0, 0.1, 9.549]) | st.floats(1.5, 20.0))
+    # A smaller factor makes another machine with constant inductances, as plausible as the first.
+    number = draw(st.sampled_from([1e3, 1e-3, 10.0, 0.1, 9.549]) | st.floats(4.0, 20.0))
     offset = draw(st.sampled_from([-1.0, 1.0])) * draw(st.floats(0.1, 1.0)) * max(abs(row[3]) for row in rows)
     for row in rows:
         row[column] *= {"unit": number, "sign": -1.0}.get(kind, 1.0)

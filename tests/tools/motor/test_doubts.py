@@ -95,6 +95,7 @@ def test_a_map_in_millivolt_seconds_is_said_to_be_one(write: Write, iq_A: list[f
          "identification.dead_time_uncertainty has no effect"),
         ({"control": {"dead_time_compensation": 0.9}, "inverter": {"dead_time_s": 0.0}},
          "control.dead_time_compensation has no effect"),
+        ({"machine": {"torque_max_Nm": 40.0}}, "torque_max_Nm = 40 N·m: i_max_A = 250 A makes 3.95 times"),
         ({"magnet": {"i_d_demag_A": 0.6}}, "magnet.i_d_demag_A = 0.6 A, .* at 150 °C withstand 0.6 A of i_d"),
         ({"magnet": {"i_d_demag_A": 280.0, "i_d_demag_A_per_K": 3.0}}, "magnets at 150 °C withstand 0 A of i_d"),
     ],
@@ -131,6 +132,25 @@ def test_reciprocity_is_warned_of_from_5_percent_on(write: Write, percent: float
     twisted = plane(ID, IQ, scaled(straight, twist=-3e-7 * percent / 23.7))
     warned = doubts.of_motor(load_motor(write(flux_map=twisted, machine={"torque_max_Nm": 100.0})))
     assert bool(warned) == is_warned and all("not reciprocal" in text for text in warned), warned
+
+
+@pytest.mark.parametrize("place", [0, 2, 15])
+@pytest.mark.parametrize(("flux", "error_Vs", "is_warned"), [
+    (0, -0.015, True), (0, 0.015, True), (1, 0.045, True), (0, 0.005, False), (1, 0.003, False),
+])  # fmt: skip
+def test_one_wrong_value_of_a_map_is_warned_of(
+    write: Write, place: int, flux: int, error_Vs: float, is_warned: bool
+) -> None:
+    """Corners and edge of the map; in the mean over the current circle they hardly count."""
+    at = [(d, q) for d in ID for q in HALF][place]  # (-300, 0), (-300, 200) or (0, 300)
+
+    def wrong(d: float, q: float) -> tuple[float, float]:
+        psi = list(straight(d, q))
+        psi[flux] += error_Vs if (d, q) == at else 0.0
+        return psi[0], psi[1]
+
+    warned = doubts.of_motor(load_motor(write(flux_map=plane(ID, HALF, wrong), machine={"torque_max_Nm": 100.0})))
+    assert bool([text for text in warned if "contradict" in text or "not reciprocal" in text]) == is_warned, warned
 
 
 def test_tables_that_are_too_coarse_are_warned_of(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:

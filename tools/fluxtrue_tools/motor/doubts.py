@@ -22,6 +22,7 @@ from fluxtrue_tools.motor.references import ERROR_WANTED, ERROR_WANTED_WEAK
 if TYPE_CHECKING:
     from fluxtrue_tools.motor.motor import Motor
 
+TORQUE_MAX = 3.0  # of torque_max_Nm, at i_max: the accepted machines of the tests have up to 1.3
 EMF_MAX = 60.0  # of what the dc link can balance, by the magnet alone at top speed: field weakening has its limits
 EMF_MIN = 0.2  # by the whole flux at the largest current: a machine so slow needs no such dc link
 SALIENCE_MAX = 100.0  # flux of i_max in the q axis over the magnet's
@@ -30,6 +31,7 @@ DEAD_TIME_MOST = 0.03  # of i_max, in one PWM period by dead time and device dro
 RUN_UP_MOST_S, RUN_UP_LEAST_S = 200.0, 2e-4  # to top speed with all torque
 OFFSET_MAX = 0.05  # of the largest psi_q
 CURL_MAX = 0.05  # of the mean inductance
+STEP_MAX = 0.05  # of the largest flux linkage; the measured map of hsm1 has 0.017
 DEMAGNETISATION_MIN = 0.05  # of i_max, at the assumed temperature: less hardly weakens a field
 
 
@@ -79,6 +81,19 @@ def _values(config: MotorConfig) -> Iterator[Doubt]:
     if not RUN_UP_LEAST_S <= run_up <= RUN_UP_MOST_S:
         yield Doubt(f"machine.inertia_kgm2 = {machine.inertia_kgm2:g} kg·m²: torque_max_Nm brings it to speed_max_rpm "
                     f"in {run_up:.3g} s; wanted: kg·m²")  # fmt: skip
+
+
+def _torque(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
+    """A flux linkage in another unit changes the torque by as much."""
+    machine = config.machine
+    angle = np.linspace(np.pi / 2.0, np.pi, 91)
+    i_d, i_q = machine.i_max_A * np.cos(angle), machine.i_max_A * np.sin(angle)
+    torque = 1.5 * machine.pole_pairs * (model.psi_d(i_d, i_q) * i_q - model.psi_q(i_d, i_q) * i_d)
+    share = float(torque.max()) / machine.torque_max_Nm
+    if share > TORQUE_MAX:
+        yield Doubt(f"machine.torque_max_Nm = {machine.torque_max_Nm:g} N·m: i_max_A = {machine.i_max_A:g} A makes "
+                    f"{share:.3g} times as much (allowed without a warning: {TORQUE_MAX:g}); is the flux linkage in "
+                    "V·s, and i_max_A the largest current?")  # fmt: skip
 
 
 def _dead_time(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
@@ -131,6 +146,21 @@ def curl(model: FluxModel, i_max_A: float) -> float:
     return rms(difference) / math.sqrt(rms(model.psi_d(d, q, nd=1)) * rms(model.psi_q(d, q, nq=1)))
 
 
+def step(flux_map: FluxMap) -> tuple[float, int, int]:
+    """The largest error in V·s that one flux linkage would have to have, and the first i_d and i_q node of its cell.
+
+    In a cell of a reciprocal map the mean slope of psi_q with i_d, of two edges, and that of psi_d with i_q are equal.
+    An error of one corner is in one of the edges, so it is twice the difference times the width of the cell.
+    """
+    d_A, q_A = np.diff(flux_map.id_A)[:, None], np.diff(flux_map.iq_A)[None, :]
+    across_d = np.diff(flux_map.psi_q_Vs, axis=0) / d_A
+    across_q = np.diff(flux_map.psi_d_Vs, axis=1) / q_A
+    twice = across_d[:, 1:] + across_d[:, :-1] - across_q[1:, :] - across_q[:-1, :]
+    steps = np.abs(twice) * np.maximum(d_A, q_A)
+    row, column = np.unravel_index(int(np.argmax(steps)), steps.shape)
+    return float(steps[row, column]), int(row), int(column)
+
+
 def _map(config: MotorConfig, flux_map: FluxMap | None, model: FluxModel) -> Iterator[Doubt]:
     if flux_map is None:
         return
@@ -145,6 +175,20 @@ def _map(config: MotorConfig, flux_map: FluxMap | None, model: FluxModel) -> Ite
         yield Doubt(f"{name}: not reciprocal: d psi_d/d i_q and d psi_q/d i_d differ by {100 * turned:.3g} % of the "
                     f"mean inductance (allowed without a warning: {100 * CURL_MAX:g} %); no lossless machine has "
                     "such a map")  # fmt: skip
+    else:
+        yield from _single_value(config, flux_map)
+
+
+def _single_value(config: MotorConfig, flux_map: FluxMap) -> Iterator[Doubt]:
+    """One wrong value, in a corner of the map for instance, hardly changes the mean over the current circle."""
+    found_Vs, row, column = step(flux_map)
+    largest = float(max(np.abs(flux_map.psi_d_Vs).max(), np.abs(flux_map.psi_q_Vs).max()))
+    if found_Vs > STEP_MAX * largest:
+        d_A, q_A = flux_map.id_A[row : row + 2], flux_map.iq_A[column : column + 2]
+        yield Doubt(f"{config.machine.flux_map}: between id_A = {d_A[0]:g} and {d_A[1]:g}, iq_A = {q_A[0]:g} and "
+                    f"{q_A[1]:g} psi_d_Vs and psi_q_Vs contradict each other by {1e3 * found_Vs:.3g} mV·s, "
+                    f"{100 * found_Vs / largest:.2g} % of the largest flux linkage (allowed without a warning: "
+                    f"{100 * STEP_MAX:g} %), as if one value were wrong")  # fmt: skip
 
 
 def _accuracy(motor: "Motor") -> Iterator[Doubt]:
@@ -169,6 +213,7 @@ def explaining(config: MotorConfig, model: FluxModel) -> Doubt | None:
 def of_motor(motor: "Motor") -> list[str]:
     """Every warning about a motor that is accepted."""
     config = motor.config
-    found = [*_units(config, motor.model), *_values(config), *_dead_time(config, motor.model), *_magnets(config),
-             *_map(config, motor.flux_map, motor.model), *_accuracy(motor), *_no_effect(config)]  # fmt: skip
+    found = [*_units(config, motor.model), *_values(config), *_torque(config, motor.model),
+             *_dead_time(config, motor.model), *_magnets(config), *_map(config, motor.flux_map, motor.model),
+             *_accuracy(motor), *_no_effect(config)]  # fmt: skip
     return [doubt.text for doubt in found]
