@@ -116,9 +116,12 @@ void test_a_short_circuit_stays_after_the_reset_of_the_faults_while_the_machine_
     TEST_ASSERT_EQUAL(SAFE_SHORT_CIRCUIT, step());
     TEST_ASSERT_TRUE(drive.task.armed);
     snapshot.sample.point.omega = SLOW;
-    for (int n = 0; n < 120; n++) { /* the known speed falls by 0.004 per step */
+    for (int n = 0; n < 120 && drive.task.safe_state.short_circuit; n++) { /* the known speed falls by 0.004 per step */
+        TEST_ASSERT_TRUE(drive.task.armed);
         (void)step();
     }
+    TEST_ASSERT_FALSE(drive.task.safe_state.short_circuit);
+    TEST_ASSERT_FALSE(drive.task.armed); /* in the step in which it ends */
     TEST_ASSERT_EQUAL(SAFE_FREEWHEEL, step());
     snapshot.sample.point.omega = FAST;
     TEST_ASSERT_EQUAL(SAFE_FREEWHEEL, step()); /* it was disabled below the level, and stays so */
@@ -137,5 +140,96 @@ void test_a_machine_that_brakes_by_either_term_of_its_torque_is_shorted_on_over_
     snapshot.sample.point.flux = (flux_point_t){.psi_q = -12000};
     TEST_ASSERT_EQUAL(SAFE_SHORT_ON_EITHER, step());
     snapshot.sample.point.flux.psi_q = 12000;
+    TEST_ASSERT_EQUAL(SAFE_SHORT_ON_GATE_FAULT, step());
+}
+
+/* At 0.4 of the speed base the line-to-line back-EMF is 0.303, below 0.9 v_dc = 0.33; a tenth more flux makes 0.373. */
+void test_a_stronger_magnet_is_shorted_at_lower_speed(void)
+{
+    snapshot.sample.point.omega = Q31(0.4);
+    snapshot.faults = FAULT_OVER_CURRENT;
+    TEST_ASSERT_NOT_EQUAL(SAFE_SHORT_CIRCUIT, step());
+    snapshot.psi_d_error = Q15(0.1);
+    TEST_ASSERT_EQUAL(SAFE_SHORT_CIRCUIT, step());
+}
+
+/* From step to step and within a period. */
+void test_the_currents_of_the_short_circuit_confirm_the_speed_while_they_stand_still(void)
+{
+    snapshot.shorted = true;
+    snapshot.sample.point.i = (dq_q15_t){-8000, 1000};
+    snapshot.i_last_period = (dq_q15_t){-7900, 1100};
+    (void)step();
+    TEST_ASSERT_EQUAL_UINT8(0, drive.task.safe_state.steady); /* before it there was none */
+    (void)step();
+    TEST_ASSERT_EQUAL_UINT8(1, drive.task.safe_state.steady);
+    snapshot.i_last_period = (dq_q15_t){-6000, 1000};
+    (void)step();
+    TEST_ASSERT_EQUAL_UINT8(0, drive.task.safe_state.steady);
+}
+
+/* The flux of the currents, without that of the magnets, is compared with an eighth of the magnets'. */
+void test_a_machine_whose_short_circuit_has_no_currents_is_at_rest(void)
+{
+    static const struct {
+        int32_t psi_d, psi_q;
+        uint8_t count;
+    } cases[] = {{14000, 0, 1}, {10000, 0, 0}, {14000, 4000, 0}, {14000, -4000, 0}, {0, 0, 0}};
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        setUp();
+        snapshot.shorted = true;
+        snapshot.sample.point.flux =
+            (flux_point_t){.psi_d = (q15_t)cases[n].psi_d, .psi_q = (q15_t)cases[n].psi_q, .psi_f0 = 14000};
+        (void)step();
+        TEST_ASSERT_EQUAL_UINT8(cases[n].count, drive.task.safe_state.without_current);
+    }
+}
+
+/* A speed that rises after a fault of the angle or of the converters is not the rotor's. */
+void test_the_speed_of_a_wrong_sensor_closes_no_short_circuit(void)
+{
+    static const uint32_t wrong[] = {FAULT_ANGLE, FAULT_INPUT, FAULT_ANGLE | FAULT_INPUT};
+    for (unsigned n = 0; n < sizeof wrong / sizeof wrong[0]; n++) {
+        setUp();
+        snapshot.sample.point.omega = FAST;
+        snapshot.faults = wrong[n];
+        TEST_ASSERT_NOT_EQUAL(SAFE_SHORT_CIRCUIT, step());
+    }
+}
+
+/* Below the speed level, and with a dc voltage above the one at which the over-voltage has ended. */
+void test_a_short_circuit_is_kept_for_an_over_voltage_only(void)
+{
+    snapshot.sample.v_dc = seam.motor.safe_state.v_release + 1;
+    snapshot.shorted = true;
+    snapshot.faults = FAULT_OVER_VOLTAGE;
+    TEST_ASSERT_EQUAL(SAFE_SHORT_CIRCUIT, step());
+    setUp();
+    snapshot.sample.v_dc = seam.motor.safe_state.v_release + 1;
+    snapshot.shorted = true;
+    snapshot.faults = FAULT_OVER_CURRENT;
+    TEST_ASSERT_NOT_EQUAL(SAFE_SHORT_CIRCUIT, step());
+    setUp();
+    snapshot.sample.v_dc = seam.motor.safe_state.v_release + 1;
+    snapshot.faults = FAULT_OVER_VOLTAGE; /* with switching disabled */
+    TEST_ASSERT_NOT_EQUAL(SAFE_SHORT_CIRCUIT, step());
+}
+
+/* At rest a gate fault needs no short circuit, and no current shows a shorted switch. */
+void test_a_gate_fault_at_rest_disables_switching(void)
+{
+    snapshot.sample.point.omega = 0;
+    snapshot.faults = FAULT_GATE;
+    TEST_ASSERT_EQUAL(SAFE_FREEWHEEL, step());
+}
+
+/* The over-voltage is there already: its short circuit was decided in the period in which it occurred. */
+void test_a_latched_over_voltage_prepares_no_second_short_circuit(void)
+{
+    snapshot.sample.point.i.q = -30000;
+    snapshot.sample.point.flux.psi_d = 12000;
+    snapshot.faults = FAULT_OVER_CURRENT;
+    TEST_ASSERT_EQUAL(SAFE_SHORT_ON_OVER_VOLTAGE, step());
+    snapshot.faults = FAULT_OVER_VOLTAGE;
     TEST_ASSERT_EQUAL(SAFE_SHORT_ON_GATE_FAULT, step());
 }
