@@ -282,3 +282,41 @@ void test_the_search_in_a_short_circuit_gets_the_angle_of_the_sample_and_the_tur
     turn_periods(2);
     TEST_ASSERT_INT_WITHIN(4, 2 * (150000000 >> 16), state->turned_q16);
 }
+
+/* A sensor that resolves 20,000 of 2^32: every second reading repeats the one before it. */
+void test_a_repeated_reading_of_a_slow_rotor_is_its_angle_and_the_speed_goes_on(void)
+{
+    for (int n = 0; n < 2000; n++) {
+        seam.theta_m += (n & 1) ? 20000U : 0U;
+        seam_period();
+        TEST_ASSERT_EQUAL_HEX32(3U * seam.theta_m, published()->theta_e);
+    }
+    for (int n = 0; n < 2; n++) { /* 30,000 of the field per period, of 225,404,288 at the speed base: 1.33e-4 */
+        seam.theta_m += (n & 1) ? 20000U : 0U;
+        seam_period();
+        TEST_ASSERT_INT_WITHIN(30000, 285819, published()->point.omega);
+    }
+}
+
+void test_a_jump_is_no_repeated_reading(void)
+{
+    for (int n = 0; n < 100; n++) {
+        seam.theta_m += 1000000U;
+        seam_period();
+    }
+    TEST_ASSERT_EQUAL_UINT16(0, drive.fast.monitor.angle);
+    seam.theta_m += 0x20000000U;
+    seam_period();
+    TEST_ASSERT_GREATER_THAN_UINT16(0, drive.fast.monitor.angle); /* counted as implausible */
+    TEST_ASSERT_EQUAL_UINT32(0, drive.fast.angle_tracker.repeats);
+}
+
+void test_from_the_smallest_dc_voltage_on_the_acting_voltage_is_known(void)
+{
+    for (int below = 0; below <= 1; below++) {
+        const sample_t sample = {.v_dc = drive.period.monitor.v_min - below};
+        drive.fast.periods_since_enable = 3;
+        acquire_check(&drive, &sample, true);
+        TEST_ASSERT_EQUAL_UINT8((below == 1) ? 0 : 3, drive.fast.periods_since_enable);
+    }
+}
