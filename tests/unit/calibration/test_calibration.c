@@ -86,6 +86,13 @@ void test_a_slew_of_zero_is_none(void)
     TEST_ASSERT_TRUE(calibration_get(&drive, CALIBRATION_torque_slew_Nm_per_s) == 0.0F);
 }
 
+/* Half a count and less: the drive must not run without a limit because of that. */
+void test_a_slew_below_the_format_s_step_does_not_become_none(void)
+{
+    calibration_set(&drive, CALIBRATION_torque_slew_Nm_per_s, 0.5F);
+    TEST_ASSERT_EQUAL_INT32(0, drive.parameters.torque_slew);
+}
+
 /* Twice the bandwidths and four thirds of m of motor.toml, whose counts the tables state. */
 void test_the_paper_s_law_takes_its_values(void)
 {

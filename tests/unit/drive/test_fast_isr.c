@@ -179,6 +179,26 @@ void test_only_a_fault_that_leaves_unknown_currents_waits_and_only_once(void)
     TEST_ASSERT_FALSE(short_circuit_waits(&later));
 }
 
+/* The currents have been moved, and the short circuit is on: the second fault must not interrupt it. */
+void test_a_second_fault_that_would_wait_does_not_interrupt_the_short_circuit(void)
+{
+    fast_state_t fast = {.faults = FAULT_OVER_SPEED};
+    short_circuit_prepare(&fast, 2);
+    TEST_ASSERT_FALSE(short_circuit_waits(&fast));
+    fast.faults |= FAULT_OVER_CURRENT;
+    TEST_ASSERT_FALSE(short_circuit_waits(&fast));
+}
+
+/* Else the gates that were off before it begins would look like a side that the drivers have ended. */
+void test_while_the_bridge_runs_no_short_circuit_is_on(void)
+{
+    fast_state_t fast = {.short_circuit = {.holds = true, .changes = 2}};
+    short_circuit_prepare(&fast, 5);
+    TEST_ASSERT_FALSE(fast.short_circuit.holds);
+    TEST_ASSERT_EQUAL_UINT8(0, fast.short_circuit.changes);
+    TEST_ASSERT_EQUAL_UINT8(5, fast.short_circuit.waits);
+}
+
 static void want_upper_switches(bool upper)
 {
     command_t command = *command_box_read(&drive.commands);
@@ -339,6 +359,24 @@ void test_flux_beyond_the_tables_changes_no_side(void)
     for (int n = 0; n < 16; n++) {
         short_with((n % 8 < 4) ? &none : &much, fx_pair(32767, 0), (dq_q15_t){1, i_max}, 0);
         expect_shorted(true);
+    }
+}
+
+/* With a gate fault, or before the short circuit is on, what was seen of another one does not count. */
+void test_where_no_open_switch_is_searched_the_search_begins_anew(void)
+{
+    const open_switch_state_t seen = {.has_begun = true, .turned_q16 = 9000, .one_sided_q16 = {7, 8, 9}};
+    const sample_t sample = {.v_dc = 12000};
+    for (int k = 0; k < 2; k++) {
+        seam_start();
+        drive.fast.faults = (k == 0) ? FAULT_GATE : FAULT_ANGLE;
+        drive.fast.short_circuit.holds = k == 0;
+        seam.gates = true;
+        drive.fast.short_circuit.open_switch = seen;
+        short_circuit_step(&drive, &sample, false, 0, fx_pair(32767, 0));
+        const open_switch_state_t *state = &drive.fast.short_circuit.open_switch;
+        TEST_ASSERT_FALSE(state->has_begun);
+        TEST_ASSERT_EQUAL_INT(0, state->one_sided_q16[0] + state->one_sided_q16[1] + state->one_sided_q16[2]);
     }
 }
 

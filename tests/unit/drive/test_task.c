@@ -687,6 +687,214 @@ void test_enable_off_in_the_current_mode_disables_switching_at_any_speed(void)
     TEST_ASSERT_FALSE(command()->run);
 }
 
+/* What the torque path and the resets get from the step. */
+
+void test_each_accepted_reset_counts_once(void)
+{
+    for (uint32_t n = 1; n <= 3; n++) {
+        drive.request.fault_resets++;
+        task_1khz(&drive);
+        task_1khz(&drive);
+        TEST_ASSERT_EQUAL_UINT32(n, drive.task.fault_resets);
+    }
+}
+
+/* Also what the paper's law has identified is discarded, and the next step does not repeat the reset. */
+void test_a_reset_of_the_identification_is_carried_out_once_for_both_laws(void)
+{
+    drive.request.identification_mode = IDENTIFICATION_PAPER;
+    drive.mrai.task.quality.psi_quality = 12345;
+    drive.request.identification_resets++;
+    seam_run();
+    TEST_ASSERT_LESS_THAN_INT32(12345, drive.mrai.task.quality.psi_quality);
+    TEST_ASSERT_EQUAL_UINT32(drive.request.identification_resets, drive.task.identification_resets);
+    drive.task.recall.unconfirmed = true;
+    task_1khz(&drive);
+    TEST_ASSERT_TRUE(drive.task.recall.unconfirmed);
+}
+
+/* The next start begins as the first one. */
+static void expect_reset_torque_path(void)
+{
+    const task_state_t *task = &drive.task;
+    TEST_ASSERT_EQUAL_INT32(0, task->torque_loop.correction);
+    TEST_ASSERT_EQUAL_INT32(0, task->torque_limit.loss);
+    TEST_ASSERT_EQUAL_HEX16(0, task->derating);
+    TEST_ASSERT_EQUAL_INT(motor.torque_max, task->reference.torque_max);
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, task->reference.psi_plan);
+    TEST_ASSERT_EQUAL_INT32(0, task->voltage_reserve.trim);
+    TEST_ASSERT_EQUAL_INT(0, task->allowed.torque_limited);
+    TEST_ASSERT_EQUAL_INT(0, task->torque_commanded);
+    TEST_ASSERT_EQUAL_INT(0, task->torque_corrected);
+}
+
+static void leave_torque_path(void)
+{
+    drive.task.torque_loop.correction = 300000000;
+    drive.task.torque_limit.loss = 100000000;
+    drive.task.derating = DERATING_POWER;
+    drive.task.voltage_reserve.trim = -100000000;
+    drive.task.allowed.torque_limited = 5000;
+    drive.task.torque_commanded = 5000;
+    drive.task.torque_corrected = 5000;
+}
+
+void test_without_switching_nothing_is_left_of_the_torque_path(void)
+{
+    seam_run();
+    leave_torque_path();
+    drive.request.enable = false;
+    task_1khz(&drive);
+    expect_reset_torque_path();
+}
+
+/* An over-temperature at speed: the references are those of the ramp to the currents of the short circuit. */
+void test_while_the_currents_are_moved_before_a_fault_the_torque_path_is_reset_too(void)
+{
+    run_at(0.9, 0.1);
+    leave_torque_path();
+    drive.task.plausibility.hot = (uint8_t)(seam.motor.plausibility.hot_steps - 1U);
+    seam.winding_dC = 2400;
+    sample_at(0.9, true, false);
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_UINT8(1, drive.task.switch_off.steps);
+    TEST_ASSERT_TRUE(command()->run);
+    expect_reset_torque_path();
+}
+
+/* With the confidence of the paper's law, which is high at once. */
+void test_in_current_mode_the_torque_loop_is_off_whatever_the_confidence(void)
+{
+    drive.request.identification_mode = IDENTIFICATION_PAPER;
+    drive.request.torque_arbitrated = 5000;
+    drive.request.current_mode = true;
+    seam_run();
+    for (int n = 0; n < 100; n++) {
+        task_1khz(&drive);
+    }
+    TEST_ASSERT_GREATER_THAN_INT(0, drive.task.identification.confidence);
+    TEST_ASSERT_EQUAL_INT32(0, drive.task.torque_loop.correction);
+}
+
+void test_after_a_movement_has_ended_the_drive_does_not_run(void)
+{
+    drive.task.movement.phase = MOVEMENT_PHASE_ENDED;
+    seam_run();
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
+    TEST_ASSERT_FALSE(command()->run);
+}
+
+/* With a voltage far above its limit the plan is reduced, but not by a voltage that the torque path has not made. */
+static q31_t trim_after(bool acting, bool current_mode)
+{
+    setUp();
+    slow_monitors_without_machine(&seam.motor);
+    drive.request.current_mode = current_mode;
+    seam_run();
+    sample_at(0.3, acting, false);
+    sample_t *s = &drive.samples.slot[drive.samples.generation % SAMPLE_SLOTS];
+    s->point.u = (dq_q15_t){20000, 20000};
+    task_1khz(&drive);
+    return drive.task.voltage_reserve.trim;
+}
+
+void test_the_reserve_of_voltage_follows_only_a_voltage_of_the_torque_path(void)
+{
+    TEST_ASSERT_LESS_THAN_INT32(0, trim_after(true, false));
+    TEST_ASSERT_EQUAL_INT32(0, trim_after(false, false));
+    TEST_ASSERT_EQUAL_INT32(0, trim_after(true, true));
+    TEST_ASSERT_EQUAL_INT32(0, trim_after(false, true));
+}
+
+/* In deep field weakening, below psi_weak, a change of the torque is slower than any calibrated slew. */
+void test_where_the_planned_flux_is_small_the_torque_changes_slowly(void)
+{
+    for (int below = 0; below <= 1; below++) {
+        setUp();
+        slow_monitors_without_machine(&seam.motor);
+        calibrate_slew(Q15_MAX);
+        seam_run();
+        drive.request.torque_arbitrated = 8000;
+        drive.task.reference.psi_plan = (q15_t)(seam.motor.psi_weak - below);
+        task_1khz(&drive);
+        TEST_ASSERT_EQUAL_INT((below == 1) ? seam.motor.torque_slew_weak : 8000, drive.task.torque_commanded);
+    }
+}
+
+/* The inverter at the middle of its derating line, and a current that the magnet does not permit. */
+void test_the_reasons_of_a_derating_are_those_of_this_step(void)
+{
+    drive.request.torque_arbitrated = INT16_MAX;
+    seam.inverter_dC = (int16_t)(seam.motor.torque_limit.inverter.end - 50);
+    seam_run();
+    TEST_ASSERT_EQUAL_HEX16(DERATING_INVERTER, drive.task.derating & DERATING_INVERTER);
+    TEST_ASSERT_LESS_THAN_INT(motor.torque_max, drive.task.torque_commanded);
+    TEST_ASSERT_EQUAL_HEX16(0, drive.task.derating & DERATING_MAGNET);
+    drive.task.reference.i_d_limited = true;
+    seam.inverter_dC = 250;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_HEX16(DERATING_MAGNET, drive.task.derating & (DERATING_MAGNET | DERATING_INVERTER));
+}
+
+/* Enable off at speed: no power is limited, neither with nor against the rotation. */
+void test_a_torque_that_is_held_at_zero_is_not_derated_by_power(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        setUp();
+        run_at(0.9, 0.1 * sign);
+        drive.request.enable = false;
+        sample_at(0.9, true, false);
+        task_1khz(&drive);
+        TEST_ASSERT_EQUAL_INT(RUN_STATE_RUN, drive.task.run_state);
+        TEST_ASSERT_EQUAL_HEX16(DERATING_REQUEST, drive.task.derating & (DERATING_REQUEST | DERATING_POWER));
+    }
+}
+
+/* The current in the period before the sample's: in a short circuit it must stand still, too. */
+void test_the_snapshot_has_the_current_of_the_period_before(void)
+{
+    drive.fast.short_circuit.holds = true;
+    for (int n = 0; n < 4; n++) {
+        sample_at(0.1, false, false);
+    }
+    task_1khz(&drive);
+    task_1khz(&drive);
+    const uint8_t steady = drive.task.safe_state.steady;
+    TEST_ASSERT_GREATER_THAN_UINT8(0, steady);
+    sample_at(0.1, false, false);
+    drive.samples.slot[drive.samples.generation % SAMPLE_SLOTS].point.i = (dq_q15_t){3000, -5000};
+    sample_at(0.1, false, false);
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_UINT8(0, drive.task.safe_state.steady);
+}
+
+/* The sample half a step before, five periods, has a constant part of phase a. */
+void test_the_snapshot_has_the_number_of_its_sample(void)
+{
+    slow_monitors_without_machine(&seam.motor);
+    seam_run();
+    for (int n = 0; n < 20; n++) {
+        sample_at(0.3, true, false);
+    }
+    drive.task.i_ref = (dq_q15_t){0, 0};
+    drive.samples.slot[(drive.samples.generation - 5U) % SAMPLE_SLOTS].i_ab = fx_pair(3200, 0);
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT32(24800, drive.task.short_side.a_q8); /* 256 * 3200/32, of which the next takes a 32nd */
+}
+
+/* While nothing is commanded the rotational voltage would be that of the measured flux, in both axes. */
+void test_without_switching_the_flux_whose_field_turns_is_the_measured_one(void)
+{
+    sample_at(0.3, false, false);
+    const flux_point_t measured = sample_box_last(&drive.samples)->point.flux;
+    drive.task.rotating = (rotating_flux_t){.psi = {1, 2}, .behind = true};
+    task_1khz(&drive);
+    TEST_ASSERT_NOT_EQUAL_INT(0, measured.psi_q);
+    TEST_ASSERT_EQUAL_INT32(measured.psi_d, drive.task.rotating.psi.d);
+    TEST_ASSERT_EQUAL_INT32(measured.psi_q, drive.task.rotating.psi.q);
+    TEST_ASSERT_FALSE(drive.task.rotating.behind);
+}
+
 /* The exchange boxes. */
 
 void test_a_sample_is_not_read_before_it_is_published(void)

@@ -432,7 +432,7 @@ void test_the_smallest_value_of_a_calibration_is_one_step_of_its_format(void)
 void test_the_first_fault_freezes_the_values_before_it(void)
 {
     freeze_frame_t frame = {0};
-    measurements_t now = {.psi_f_Vs = 0.07F, .r_ohm = 0.02F};
+    measurements_t now = {.psi_f_Vs = 0.07F, .r_ohm = 0.02F, .motor_check = 3};
     for (int ms = 1; ms <= 100; ms++) {
         now.i_q_A = (int16_t)(10 * ms);
         now.speed_rpm = (ms == 99) ? 1e9F : -50.5F;
@@ -448,6 +448,8 @@ void test_the_first_fault_freezes_the_values_before_it(void)
     TEST_ASSERT_EQUAL_INT(0, frame.ecu_faults);
     TEST_ASSERT_EQUAL_INT(STATE_RUN, frame.state);
     TEST_ASSERT_EQUAL_FLOAT(0.07F, frame.psi_f_Vs);
+    TEST_ASSERT_EQUAL_FLOAT(0.02F, frame.r_ohm);
+    TEST_ASSERT_EQUAL_UINT8(3, frame.motor_check);
     for (int n = 0; n < 32; n++) {
         TEST_ASSERT_EQUAL_INT(10 * (69 + n), frame.i_q_A[(frame.oldest + (unsigned)n) % FREEZE_FRAME_SAMPLES]);
     }

@@ -197,3 +197,84 @@ void test_limits_that_stop_are_zero_after_310_ms(void)
     TEST_ASSERT_EQUAL_INT32(0, frames.power_drive_counts + frames.power_regen_counts);
     TEST_ASSERT_TRUE(frames.battery.seen && !frames.battery.alive);
 }
+
+/* 10,000 counts of the torque and of its limits, 60,000 of both powers. */
+void test_the_ends_of_the_ranges_are_accepted(void)
+{
+    synchronise(COMMAND_ID);
+    for (int sign = -1; sign <= 1; sign += 2) {
+        receive(signed_frame(COMMAND_ID, ENABLED_TORQUE, sign * 10000, 10000, 10000));
+        TEST_ASSERT_EQUAL_INT32(sign * 10000, frames.torque_counts);
+    }
+    TEST_ASSERT_EQUAL_INT32(10000, frames.drive_counts);
+    TEST_ASSERT_EQUAL_INT32(10000, frames.regen_counts);
+    counter = 0;
+    synchronise(BATTERY_ID);
+    receive(signed_frame(BATTERY_ID, 0, 60000, 60000, 0));
+    TEST_ASSERT_EQUAL_INT32(60000, frames.power_drive_counts);
+    TEST_ASSERT_EQUAL_INT32(60000, frames.power_regen_counts);
+}
+
+/* The counter has 15 values: after 14 a 15 would be ahead by 1, after 13 by 2. */
+void test_a_counter_of_15_never_follows(void)
+{
+    can_frame_t invalid = signed_frame(COMMAND_ID, ENABLED_TORQUE | 0x0FU, 900, 2000, 1500);
+    invalid.data[1] |= 0x0FU;
+    invalid.data[0] = e2e_crc(0x1101U, &invalid);
+    for (uint8_t last = 13; last <= 14; last++) {
+        frames.command = (second_level_channel_t){.counter = last, .synced = true};
+        receive(invalid);
+        TEST_ASSERT_EQUAL_INT32(0, frames.torque_counts);
+        TEST_ASSERT_FALSE(frames.command.alive);
+        TEST_ASSERT_EQUAL_UINT8(last, frames.command.counter);
+    }
+}
+
+void test_each_message_has_a_counter_of_its_own(void)
+{
+    counter = 3;
+    synchronise(COMMAND_ID);
+    command(500);
+    counter = 9;
+    synchronise(BATTERY_ID);
+    receive(signed_frame(BATTERY_ID, 0, 100, 200, 0));
+    TEST_ASSERT_EQUAL_INT32(100, frames.power_drive_counts);
+    counter = 5;
+    command(600);
+    TEST_ASSERT_EQUAL_INT32(600, frames.torque_counts);
+    counter = 11;
+    receive(signed_frame(BATTERY_ID, 0, 300, 400, 0));
+    TEST_ASSERT_EQUAL_INT32(300, frames.power_drive_counts);
+}
+
+void test_another_identifier_with_a_checksum_of_the_battery_s_limits_is_no_message(void)
+{
+    synchronise(BATTERY_ID);
+    can_frame_t other = signed_frame(BATTERY_ID, 0, 100, 200, 0);
+    other.id = 0x112;
+    receive(other);
+    TEST_ASSERT_FALSE(frames.battery.alive);
+    TEST_ASSERT_EQUAL_INT32(0, frames.power_drive_counts);
+}
+
+/* To the microsecond, also after frames that came in time. */
+void test_the_time_out_begins_with_the_last_frame(void)
+{
+    synchronise(COMMAND_ID);
+    for (int n = 0; n < 3; n++) {
+        command(500);
+        second_level_frames_tick(&frames, 34999);
+        TEST_ASSERT_EQUAL_INT32(500, frames.torque_counts);
+    }
+    second_level_frames_tick(&frames, 1);
+    TEST_ASSERT_EQUAL_INT32(0, frames.torque_counts);
+}
+
+/* The age is that of a command, and the first frame is none. */
+void test_the_second_frame_may_come_later_than_the_time_out(void)
+{
+    synchronise(COMMAND_ID);
+    second_level_frames_tick(&frames, 40000);
+    command(500);
+    TEST_ASSERT_EQUAL_INT32(500, frames.torque_counts);
+}

@@ -104,6 +104,48 @@ void test_near_standstill_the_larger_limit_applies(void)
     TEST_ASSERT_EQUAL_INT32(2000, permitted.positive.bound);
 }
 
+void test_up_to_the_turn_of_standstill_in_both_directions_the_larger_limit_applies(void)
+{
+    static const struct {
+        int32_t turn, counts;
+    } cases[] = {{999, 300}, {0, 300}, {-999, 300}, {-1000, 300}, {-1001, 200}};
+    frames.torque_counts = 500;
+    for (unsigned k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        frames.drive_counts = (cases[k].turn < 0) ? 300 : 200;
+        frames.regen_counts = 500 - frames.drive_counts; /* the smaller one is that of the positive direction */
+        permitted = (second_level_permitted_t){0};
+        steps(1, cases[k].turn, OPEN);
+        TEST_ASSERT_EQUAL_INT32(10 * cases[k].counts, permitted.positive.bound);
+    }
+}
+
+/* Parts begin with the steps 5, 10, 15 and 20: with the 20th step the request of the first one leaves the last part. */
+void test_a_request_of_one_step_is_held_like_a_longer_one(void)
+{
+    frames.torque_counts = 500;
+    steps(1, TURN, OPEN);
+    frames.torque_counts = 0;
+    for (int n = 0; n < 18; n++) {
+        steps(1, TURN, OPEN);
+        TEST_ASSERT_EQUAL_INT32(5000, permitted.positive.bound);
+    }
+    steps(1, TURN, OPEN);
+    TEST_ASSERT_EQUAL_INT32(4900, permitted.positive.bound);
+}
+
+/* A count of half of the format's step is rounded up, one of 2^-16 less down. */
+void test_a_count_is_rounded_to_the_nearest_step_of_the_format(void)
+{
+    second_level_constants_t fine = constants;
+    for (int k = 0; k < 2; k++) {
+        fine.torque_per_count = 0x7FFF + k;
+        frames.torque_counts = 1;
+        permitted = (second_level_permitted_t){0};
+        second_level_permitted_step(&fine, &permitted, &frames, TURN, OPEN);
+        TEST_ASSERT_EQUAL_INT32(k, permitted.positive.bound);
+    }
+}
+
 void test_no_limit_permits_more_than_the_rated_torque(void)
 {
     frames.torque_counts = 9000;

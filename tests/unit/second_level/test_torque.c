@@ -191,3 +191,136 @@ void test_while_the_bridge_does_not_switch_nothing_is_reported(void)
     in.acting = true;
     TEST_ASSERT_GREATER_THAN_INT(14, steps_to_fault(500));
 }
+
+/* A table without torque of the magnet, t = |i_q|, shows the current itself. At an angle of 2^-17 of a turn the sine is
+ * the next one: 3 counts of 2^15, so that i_alpha = 0.6 has i_q = -2. */
+void test_the_angle_is_rounded_to_the_nearest_of_65536(void)
+{
+    for (int n = 0; n < SECOND_LEVEL_ROWS * SECOND_LEVEL_COLUMNS; n++) {
+        constants.torque[n] = (int16_t)(2047 * (n % SECOND_LEVEL_COLUMNS));
+    }
+    constants.pole_pairs = 1;
+    second_level_sample_t at = sample(0.6, 0.0, 0.0);
+    at.theta_m = 0x7FFFU;
+    TEST_ASSERT_EQUAL_INT32(0, second_level_own_torque(&constants, &at));
+    at.theta_m = 0x8000U;
+    TEST_ASSERT_EQUAL_INT32(-2, second_level_own_torque(&constants, &at));
+}
+
+/* i_beta = 1000/sqrt(3) = 577.3, of which the cosine of 0 degrees, 32767/32768, leaves 576 after rounding down; the
+ * table is t = |i_q| here. */
+void test_a_column_of_the_table_is_a_sixteenth_of_the_current(void)
+{
+    for (int n = 0; n < SECOND_LEVEL_ROWS * SECOND_LEVEL_COLUMNS; n++) {
+        constants.torque[n] = (int16_t)(2048 * (n % SECOND_LEVEL_COLUMNS % 16));
+    }
+    const second_level_sample_t at = {.counts = {32768, 32768 + 500, 32768 - 500}};
+    TEST_ASSERT_EQUAL_INT32(576, second_level_own_torque(&constants, &at));
+}
+
+/* The sign of the torque is that of i_q; without i_q the table counts as it is. */
+void test_without_current_across_the_magnet_the_table_counts_as_it_is(void)
+{
+    for (int n = 0; n < SECOND_LEVEL_ROWS * SECOND_LEVEL_COLUMNS; n++) {
+        constants.torque[n] = 700;
+    }
+    second_level_sample_t at = {.counts = {32768, 32768, 32768}};
+    TEST_ASSERT_EQUAL_INT32(700, second_level_own_torque(&constants, &at));
+    at.counts.i_b -= 1000;
+    at.counts.i_c += 1000;
+    TEST_ASSERT_EQUAL_INT32(-700, second_level_own_torque(&constants, &at));
+}
+
+/* i_q = 0.3, with the mean already there: it stays to a count. */
+static int32_t settle_mean(void)
+{
+    request(100);
+    in.sample = sample(0.0, 0.3, 0.0);
+    for (int n = 0; n < 100; n++) {
+        level.frames.command.age_us = 0;
+        (void)second_level_step(&constants, &level, &in);
+    }
+    return level.mean_q8 >> 8;
+}
+
+/* A fourth of the torque in the first step, times 256. */
+void test_the_mean_follows_the_torque_with_a_fourth_per_step(void)
+{
+    in.sample = sample(0.0, 0.3, 0.0);
+    (void)second_level_step(&constants, &level, &in);
+    TEST_ASSERT_EQUAL_INT32(64 * second_level_own_torque(&constants, &in.sample), level.mean_q8);
+}
+
+/* 1000 of the request and 1000/64 of the share leave this tolerance. */
+void test_a_torque_of_just_the_bound_is_permitted(void)
+{
+    for (int below = 0; below <= 1; below++) {
+        setUp();
+        constants.tolerance = settle_mean() - 1015 - below;
+        level.confirmed_steps = 0;
+        TEST_ASSERT_EQUAL_INT((below == 1) ? 15 : 0, steps_to_fault(100));
+        TEST_ASSERT_EQUAL_INT32((below == 1) ? 15 : 0, level.confirmed_steps);
+    }
+}
+
+/* However long it lasts, the count stays at that of the confirmation, and the first step below the bound ends it. */
+void test_the_count_of_the_confirmation_saturates_and_ends_at_once(void)
+{
+    (void)settle_mean();
+    TEST_ASSERT_EQUAL_INT32(15, level.confirmed_steps);
+    constants.tolerance = 32767;
+    TEST_ASSERT_EQUAL_INT(0, steps_to_fault(1));
+    TEST_ASSERT_EQUAL_INT32(0, level.confirmed_steps);
+}
+
+void test_after_switching_was_disabled_mean_and_confirmation_begin_anew(void)
+{
+    request(100);
+    in.sample = sample(0.0, 0.3, 0.0);
+    const int first = steps_to_fault(100);
+    TEST_ASSERT_GREATER_THAN_INT(0, first);
+    in.acting = false;
+    TEST_ASSERT_EQUAL_INT(0, steps_to_fault(1));
+    TEST_ASSERT_EQUAL_INT32(0, level.mean_q8);
+    TEST_ASSERT_EQUAL_INT32(0, level.confirmed_steps);
+    in.acting = true;
+    TEST_ASSERT_EQUAL_INT(first, steps_to_fault(100));
+}
+
+/* Bound of a positive request with 200 counts while driving and 300 while braking; the angle moves across zero. */
+static int32_t bound_after(uint32_t before, uint32_t now)
+{
+    setUp();
+    request(500);
+    in.sample.theta_m = before;
+    (void)second_level_step(&constants, &level, &in);
+    level.permitted = (second_level_permitted_t){0};
+    level.frames.drive_counts = 200;
+    level.frames.regen_counts = 300;
+    in.sample.theta_m = now;
+    (void)second_level_step(&constants, &level, &in);
+    return level.permitted.positive.bound;
+}
+
+void test_the_direction_of_rotation_is_that_of_the_last_step(void)
+{
+    TEST_ASSERT_EQUAL_INT32(2000, bound_after(0xF0000000U, 0xF0001388U));
+    TEST_ASSERT_EQUAL_INT32(2000, bound_after(0xFFFFF000U, 0x00001000U));
+    TEST_ASSERT_EQUAL_INT32(3000, bound_after(0x10001388U, 0x10000000U));
+    TEST_ASSERT_EQUAL_INT32(3000, bound_after(0x00001000U, 0xFFFFF000U));
+}
+
+/* (QA-2): each part multiplies the signature, which the question begins. */
+void test_the_signature_has_all_parts_whether_the_bridge_switches_or_not(void)
+{
+    uint32_t expected = 9;
+    for (uint32_t part = 0x51; part <= 0x53; part++) {
+        expected = (expected ^ part) * 16777619U;
+    }
+    in.question = 9;
+    for (int k = 0; k < 2; k++) {
+        in.acting = k == 1;
+        (void)second_level_step(&constants, &level, &in);
+        TEST_ASSERT_EQUAL_HEX32(expected, level.flow);
+    }
+}
