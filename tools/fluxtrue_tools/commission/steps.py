@@ -140,7 +140,7 @@ def _resistance(drive: Capture, found: Found, known: Nameplate) -> None:
     found.levels = levels.measure(drive, known, found.first)
     found.balance = balance.measure(found.levels)
     alike = [found.balance.corrected(raw) for raw in found.levels]
-    found.resistance = levels.solve(alike, known.psi_f_Vs, drive.get("compensation_V"))
+    found.resistance = levels.solve(alike, known.psi_f_Vs, drive.get("compensation_V"), found.balance.noise_A)
     found.first = plan.first(drive, known, _losses(found, known))
 
 
@@ -161,7 +161,7 @@ def _map(drive: Capture, found: Found, known: Nameplate) -> None:
     alike = [found.balance.corrected(raw) for raw in used]
     error = surface.MEASURED if found.spun is not None else surface.GIVEN if known.psi_f_source else surface.GUESSED
     found.surface = surface.fit(alike, found.balance.noise_A, known.i_max_A, found.resistance.r_ohm,
-                                (known.psi_f_Vs, error), found.resistance.total_V)  # fmt: skip
+                                (known.psi_f_Vs, error), found.resistance.total_V, found.resistance.knee_A)  # fmt: skip
 
 
 STEPS = (
