@@ -147,10 +147,11 @@ def _resistance(drive: Capture, found: Found, known: Nameplate) -> None:
 def _map(drive: Capture, found: Found, known: Nameplate) -> None:
     assert found.resistance is not None and found.first is not None
     _enable(drive)
+    losses = plan.Losses(found.resistance.r_ohm, found.resistance.total_V)
     compensated = drive.get("dead_time_compensation")
     drive.set("dead_time_compensation", 0.0)  # by the sign of currents with an offset: it can be computed better later
     try:
-        found.bursts = plan.sweep(drive, found.first, known)
+        found.bursts = plan.sweep(drive, found.first, known, losses)
     finally:
         drive.set("dead_time_compensation", compensated)
     used = [raw for raw in found.bursts if raw.failure in ("", MOVED)]  # up to its end by a movement a burst is valid
