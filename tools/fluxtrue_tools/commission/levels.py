@@ -141,7 +141,9 @@ class _Equations:
         logs = np.log(largest_A * np.geomspace(*KNEES, KNEE_STEPS))
         best = min(range(1, len(logs) - 1), key=lambda k: left(logs[k]))
         found = minimize_scalar(left, bounds=(logs[best - 1], logs[best + 1]), method="bounded")
-        return math.exp(found.x) if found.fun < (1.0 - EXPLAINS) * self.solve(self.rows(0.0))[1] else 0.0
+        (sharp, sharp_left), (soft, _) = (self.solve(self.rows(knee_A)) for knee_A in (0.0, math.exp(found.x)))
+        shows = found.fun < (1.0 - EXPLAINS) * sharp_left and abs(soft[0] - sharp[0]) * largest_A > RESOLUTION_V
+        return math.exp(found.x) if shows else 0.0
 
     def sigma(self, rows: Array, left: float) -> float:
         """Of the resistance, by the noise."""

@@ -15,7 +15,7 @@ from fluxtrue_tools.motor.flux_model import Array
 
 FIRST_VOLTAGE = 0.15  # with the smallest inductance that is allowed for, 0.2 of i_max in a period
 FIRST_CURRENT = 0.1  # of i_max
-VOLTAGES = (0.12, 0.55)
+VOLTAGES = (0.12, 0.68)
 STEP = 0.12  # of i_max: change of the current in a period at most
 BIAS_STEP = 0.15  # of i_max: the same for bursts at a bias, whose steepest change the last one has shown
 FASTER = 2.0  # at most, from one bias to the next
@@ -27,7 +27,7 @@ BIASES = (0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.85)  # of -i_max
 BIAS_SLOWER = 3.5  # the current in d changes more slowly than that in q, and stays in its band
 LOST_MAX = 2  # bursts of all that may fail
 TRAVEL = 1.5  # of the time to the bias without saturation
-REVERSALS_D, REVERSALS_Q = 6, 5
+REVERSALS_D, REVERSALS_Q = 6, 3
 MAGNET = 3.0  # times the guess of the magnet's flux linkage at most
 FIRST = (0.2, 0.9)  # share of its bound at which the first half wave may end
 
@@ -92,18 +92,24 @@ def _steepest_within(raw: Raw, share: float, top_A: float) -> float:
     return float(changes[inside].max()) / share
 
 
-def _linkages(raw: Raw, losses: Losses) -> Array:
-    """What the voltages show: without the magnet's at the start."""
+def _linkages(raw: Raw, losses: Losses) -> tuple[Array, Array]:
+    """What the voltages of the axes in use show, and what the magnet's at the start is multiplied by (CM-11)."""
     linkage = integrate(raw, losses.r_ohm)
-    return np.asarray(linkage.psi + losses.level_V * linkage.of_level)
+    psi, (of_d, of_q) = linkage.psi + losses.level_V * linkage.of_level, raw.axes
+    return of_d * psi.real + 1j * of_q * psi.imag, linkage.turned
 
 
-def _magnet_Vs(raws: Sequence[Raw], losses: Losses, guess_Vs: float) -> float:
-    """The magnet's flux linkage, by the share that it has in the movements of the rotor: (CM-35)."""
+def _torque(psi: Array, i: Array) -> Array:
+    """Of 1.5 times the pole pairs, in V·s·A."""
+    return np.asarray((np.conj(psi) * i).imag)
+
+
+def magnet_Vs(raws: Sequence[Raw], losses: Losses, guess_Vs: float) -> float:
+    """The magnet's flux linkage, by the share that it has in the movements of the rotor: (CM-34)."""
     rows, moved = [], []
     for raw in raws:
-        psi, i = _linkages(raw, losses), raw.i
-        of_parts = np.column_stack((i.imag, psi.real * i.imag - psi.imag * i.real))
+        psi, turned = _linkages(raw, losses)
+        of_parts = np.column_stack((_torque(turned, raw.i), _torque(psi, raw.i)))
         rows.append(raw.period_s**2 * np.cumsum(np.cumsum(of_parts, axis=0), axis=0))
         moved.append(raw.theta - raw.theta[0])
     of_magnet, of_others = np.linalg.lstsq(np.vstack(rows), np.concatenate(moved), rcond=None)[0]
@@ -124,10 +130,11 @@ def balanced(raw: Raw, losses: Losses, psi_f_Vs: float, change: complex, top_A: 
     change   of the current along d from this burst to the next one, and of the flux linkage along d
     top_A    bound of the next burst
     """
+    psi, turned = _linkages(raw, losses)
     rise = _rise(raw.i.imag)
-    psi, i_q = _linkages(raw, losses)[rise], raw.i.imag[rise]
-    psi_d, i_d = psi_f_Vs + psi.real + change.imag, raw.i.real[rise] + change.real
-    impulse = np.maximum.accumulate(np.cumsum((psi_d * i_q - psi.imag * i_d) * np.sign(i_q[-1])))
+    torque = _torque(psi + psi_f_Vs * turned + change.imag, raw.i + change.real)[rise]
+    i_q = raw.i.imag[rise]
+    impulse = np.maximum.accumulate(np.cumsum(torque * np.sign(i_q[-1])))
     reached = np.maximum.accumulate(np.abs(i_q))
     half = 0.5 * float(np.interp(top_A, reached, impulse))
     return float(np.clip(np.interp(half, impulse, reached) / min(top_A, float(reached[-1])), *FIRST))
@@ -170,7 +177,7 @@ def sweep(drive: Capture, found: First, known: Nameplate, losses: Losses) -> lis
         centre, delay = -bias * i_max_A, math.ceil(TRAVEL * bias * i_max_A / per_period)
         top = math.sqrt((LEVELS[-1] * i_max_A) ** 2 - (abs(centre) + band) ** 2)
         v_q = min(_voltage(_steepest_within(raws[-1], v_q, top), i_max_A, BIAS_STEP), FASTER * v_q)
-        psi_f_Vs = _magnet_Vs(raws[len(along_d) :], losses, known.psi_f_Vs)
+        psi_f_Vs = magnet_Vs(raws[len(along_d) :], losses, known.psi_f_Vs)
         share = balanced(raws[-1], losses, psi_f_Vs, complex(1.0, found.l_d_H) * (centre - before), top)
         raws.append(record(drive, Burst(v_d, v_q, (centre - band, centre + band), (-top, top), REVERSALS_Q, delay,
                                         share), known))  # fmt: skip
