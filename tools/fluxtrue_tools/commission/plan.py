@@ -124,15 +124,17 @@ def _rise(i_q: Array) -> slice:
     return slice(int(other[-1]) + 1 if len(other) else 0, top + 1)
 
 
-def balanced(raw: Raw, losses: Losses, psi_f_Vs: float, change: complex, top_A: float) -> float:
+def balanced(
+    raw: Raw, losses: Losses, psi_f_Vs: float, top_A: float, more_A: float = 0.0, more_Vs: float = 0.0
+) -> float:
     """The share of its bound at which the first half wave along q ends with half of the impulse of the others: (CM-27).
 
-    change   of the current along d from this burst to the next one, and of the flux linkage along d
-    top_A    bound of the next burst
+    top_A             bound of the next burst
+    more_A, more_Vs   current and flux linkage along d that the next burst has more than this one
     """
     psi, turned = _linkages(raw, losses)
     rise = _rise(raw.i.imag)
-    torque = _torque(psi + psi_f_Vs * turned + change.imag, raw.i + change.real)[rise]
+    torque = _torque(psi + psi_f_Vs * turned + more_Vs, raw.i + more_A)[rise]
     i_q = raw.i.imag[rise]
     impulse = np.maximum.accumulate(np.cumsum(torque * np.sign(i_q[-1])))
     reached = np.maximum.accumulate(np.abs(i_q))
@@ -150,7 +152,7 @@ def _ladder(drive: Capture, known: Nameplate, losses: Losses, steepest_A: float,
         share = _voltage(GROWTH * steepest_A, i_max_A)
         free = (-top, top)
         if of_q:
-            half = balanced(raws[-1], losses, known.psi_f_Vs, 0j, top) if raws else Burst.first
+            half = balanced(raws[-1], losses, known.psi_f_Vs, top) if raws else Burst.first
             burst = Burst(0.0, share, free, free, REVERSALS_Q, first=half)
         else:
             burst = Burst(share, 0.0, (-top, TOP_D * i_max_A), free, REVERSALS_D)
@@ -172,14 +174,14 @@ def sweep(drive: Capture, found: First, known: Nameplate, losses: Losses) -> lis
     v_d = _voltage(BIAS_SLOWER * steep_d, i_max_A)
     per_period = v_d * found.volts * period_s / found.l_d_H
     band, v_q = BAND * i_max_A, float(np.abs(along_q[-1].u.imag).max()) / found.volts
-    before = 0.0
+    centre = 0.0
     for bias in BIASES:
+        more_A = -bias * i_max_A - centre
         centre, delay = -bias * i_max_A, math.ceil(TRAVEL * bias * i_max_A / per_period)
         top = math.sqrt((LEVELS[-1] * i_max_A) ** 2 - (abs(centre) + band) ** 2)
         v_q = min(_voltage(_steepest_within(raws[-1], v_q, top), i_max_A, BIAS_STEP), FASTER * v_q)
         psi_f_Vs = magnet_Vs(raws[len(along_d) :], losses, known.psi_f_Vs)
-        share = balanced(raws[-1], losses, psi_f_Vs, complex(1.0, found.l_d_H) * (centre - before), top)
+        share = balanced(raws[-1], losses, psi_f_Vs, top, more_A, found.l_d_H * more_A)
         raws.append(record(drive, Burst(v_d, v_q, (centre - band, centre + band), (-top, top), REVERSALS_Q, delay,
                                         share), known))  # fmt: skip
-        before = centre
     return raws
