@@ -3,6 +3,7 @@
 
 import cmath
 import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,13 +12,13 @@ import pytest
 
 from fluxtrue_tools.cli import run as command
 from fluxtrue_tools.commission import hidden
-from fluxtrue_tools.commission.drive import SoftwareInTheLoop
+from fluxtrue_tools.commission.drive import PULSE, SoftwareInTheLoop
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import balance_error, resistance_error, score
 from fluxtrue_tools.commission.steps import chosen, run
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_map import load_flux_map
-from fluxtrue_tools.motor.flux_model import SplineModel
+from fluxtrue_tools.motor.flux_model import Array, SplineModel
 from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
 
@@ -28,6 +29,7 @@ DRAWS = [("saturated", 12, 72), ("saturated", 12, 240), ("saturated", 12, 294), 
 DRAW_RMS = 0.005
 # The winding drops 1.2 V at the largest current; a phase current is near zero at every level; large swings.
 LITTLE_VOLTAGE = [("saturated", 126), ("linear", 138), ("hsm1", 105)]
+SWINGS = [("pmasynrm", 107, 1.0), ("hsm1", 110, 4.0), ("hsm1", 120, 8.0)]  # machine, seed, electrical degrees
 R_LEFT, LEG_V = 0.004, 0.05  # beyond the sensors' gains; 5 mV of 1.2 V; a half per cent of what a leg loses
 
 
@@ -82,6 +84,40 @@ def test_resistance_where_little_voltage_shows_it(name: str, seed: int, unknown:
     assert abs(error) <= R_SHARE
     assert abs(left) <= R_LEFT
     assert abs(found.total_V - leg_V * plant["vdc_gain"]) <= LEG_V
+
+
+class Watched(SoftwareInTheLoop):
+    """With the plant's true angle beside what is recorded."""
+
+    def __init__(self, loop: Loop) -> None:
+        super().__init__(loop)
+        self.angles: list[Array] = []
+        self.swings_rad: list[float] = []  # of the shaft, one for each burst
+
+    def capture(self, names: Sequence[str], periods: int) -> Array:
+        self._loop.record([*names, "truth.theta_m_rad"])
+        rows = self._loop.run(periods)
+        self.angles.append(rows[:, -1])
+        return np.asarray(rows[:, :-1])
+
+    def pulse(self, values: Mapping[str, float]) -> Array:
+        self.angles = []
+        rows = super().pulse(values)
+        angle = np.unwrap(np.concatenate(self.angles))[rows[:, -1] == PULSE]
+        self.swings_rad.append(float(np.ptp(angle)) if angle.size else 0.0)
+        return rows
+
+
+@pytest.mark.parametrize(("name", "seed", "most_deg"), SWINGS)
+def test_the_rotor_swings_little(name: str, seed: int, most_deg: float, unknown: Motor, known: Nameplate) -> None:
+    """With 1/sqrt(2) for the first half wave and one voltage for all bursts at a bias these machines move by 1.4, 11.2
+    and 16.6 degrees."""
+    _, flux_map, plant = hidden.draw(name, seed, unknown, known.i_max_A)
+    drive = Watched(Loop(unknown.library, plant, flux_map))
+    found = run(drive, chosen(("map",)), known, lambda _: None)
+    swings_deg = np.degrees(known.pole_pairs * np.array(drive.swings_rad[-len(found.bursts) :]))
+    print(name, seed, np.round(swings_deg, 1))
+    assert 0.0 < swings_deg.max() <= most_deg
 
 
 def test_the_truth_cannot_be_read(unknown: Motor, known: Nameplate) -> None:

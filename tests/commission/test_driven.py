@@ -20,12 +20,12 @@ DRIVE_S = 60.0
 IRON = 0.25  # of the loss at the speed of the measurement: 17 % at worst on the first hidden machines
 
 
-def proven(folder: Path, out: Path, name: str, seed: int, other_errors: bool, missed: str = "none") -> pd.DataFrame:
-    """Within every bound but the one that begins so."""
+def proven(folder: Path, out: Path, name: str, seed: int, other_errors: bool) -> pd.DataFrame:
+    """Within every bound."""
     job = proof.Job(folder, other_errors, DRIVE_S, STRATA)
     table = pd.DataFrame(proof.one(job, name, seed, 0, out))
     print(proof.line(table))
-    bounds = [bound for bound in proof.bounds(table, job.factor) if not bound.what.startswith(missed)]
+    bounds = proof.bounds(table, job.factor)
     assert len(bounds) > 15
     assert not [str(bound) for bound in bounds if not bound.met]
     return table
@@ -47,9 +47,9 @@ def test_the_folder_of_a_hidden_machine_makes_true_torque(folder: Path, tmp_path
 
 
 def test_errors_of_kinds_that_no_step_knows_stay_within_twice_the_bounds(folder: Path, tmp_path: Path) -> None:
-    """The resistance does not: a soft knee looks like one, and torque does not depend on it. Harmonics of the angle
-    sensor made the inertia 10.9 % too small before the fit took them as noise of the speed."""
-    table = proven(folder, tmp_path / "motor", "hsm1", 135, other_errors=True, missed="r_error")
+    """A soft knee looked like a resistance, up to 4.4 % of it, before the fit had a knee. Harmonics of the angle sensor
+    made the inertia 10.9 % too small before the fit took them as noise of the speed."""
+    table = proven(folder, tmp_path / "motor", "hsm1", 135, other_errors=True)
     assert abs(table["iron"].iloc[0]) < IRON
     text = (tmp_path / "motor" / "motor.toml").read_text(encoding="utf-8")
     for key in ("iron_loss_hysteresis", "iron_loss_uncertainty"):

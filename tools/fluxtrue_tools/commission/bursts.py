@@ -19,6 +19,7 @@ STARTS = 6  # of one burst
 BRAKE_S, BRAKE_STEPS, STANDING_RPM = 0.005, 60, 0.5
 REST_S = 0.02  # after a burst: the drive controls the currents to zero
 TURN = 2.0 * math.pi
+STEADY = 1e-6  # of a knee: a current that does not change in a period
 
 
 @dataclass(frozen=True)
@@ -78,9 +79,10 @@ class Raw:
         return float(np.abs(self.theta - self.theta[0]).max())
 
     def within(self, low_A: float, high_A: float) -> "Raw":
-        """From the first sample on whose current along d is between the two."""
-        inside = (self.i.real > low_A) & (self.i.real < high_A)
-        kept = slice(int(np.argmax(inside)), None)
+        """From the first to the last sample whose current along d is between the two: on the way back to zero the
+        inductance is another one, and near zero the voltages of the legs are unknown."""
+        inside = np.flatnonzero((self.i.real > low_A) & (self.i.real < high_A))
+        kept = slice(int(inside[0]), int(inside[-1]) + 1) if len(inside) else slice(0)
         return replace(self, i=self.i[kept], u=self.u[kept], theta=self.theta[kept], zero=self.zero[kept])
 
     def without(self, offset: complex) -> "Raw":
@@ -187,13 +189,36 @@ def mean_sign(begins: Array, ends: Array) -> Array:
     )
 
 
-def _signs(i_s: Array) -> Array:
-    """The vector of three legs whose voltages are the signs of their currents: means over each period."""
+def _share(i: Array, knee_A: float) -> Array:
+    """Of its voltage, with its sign, that a leg loses at a current: (CM-33)."""
+    over = np.abs(i) / knee_A
+    return np.sign(i) * np.where(over < 1.0, 0.5 * over, 1.0 - 0.5 / np.maximum(over, 1.0))
+
+
+def _area(i: Array, knee_A: float) -> Array:
+    """The integral of _share() from zero on."""
+    over = np.abs(i) / knee_A
+    beyond = np.maximum(over, 1.0)
+    return knee_A * np.where(over < 1.0, 0.25 * over * over, beyond - 0.5 * np.log(beyond) - 0.75)
+
+
+def mean_share(begins: Array, ends: Array, knee_A: float) -> Array:
+    """What (CM-33) has in place of the mean sign; a knee of 0 is that of a constant voltage."""
+    if knee_A <= 0.0:
+        return mean_sign(begins, ends)
+    change = ends - begins
+    steady = np.abs(change) < STEADY * knee_A
+    means = (_area(ends, knee_A) - _area(begins, knee_A)) / np.where(steady, 1.0, change)
+    return np.where(steady, _share(0.5 * (begins + ends), knee_A), means)
+
+
+def of_legs(i_s: Array, knee_A: float) -> Array:
+    """The vector of three legs that lose 1 V at large currents: means over each period."""
     total = np.zeros(len(i_s) - 1, complex)
     for k in range(3):
         axis = np.exp(2j * np.pi * k / 3.0)
         i = (i_s * np.conj(axis)).real
-        total += 2.0 / 3.0 * axis * mean_sign(i[:-1], i[1:])
+        total += 2.0 / 3.0 * axis * mean_share(i[:-1], i[1:], knee_A)
     return total
 
 
@@ -202,7 +227,7 @@ def _sum(means: Array, period_s: float) -> Array:
     return period_s * np.concatenate(([0.0], np.cumsum(means)))
 
 
-def integrate(raw: Raw, r_ohm: float) -> Linkage:
+def integrate(raw: Raw, r_ohm: float, knee_A: float = 0.0) -> Linkage:
     """(CM-11): in the stationary frame, so that a movement of the rotor is part of the model."""
     turn = np.exp(1j * raw.theta)
     middle = np.exp(0.5j * (raw.theta[1:] + raw.theta[:-1]))
@@ -210,5 +235,5 @@ def integrate(raw: Raw, r_ohm: float) -> Linkage:
     volts = _sum(raw.u[:-1] * middle, raw.period_s)
     r_part = _sum(0.5 * (i_s[1:] + i_s[:-1]), raw.period_s)
     back = np.exp(-1j * raw.theta)
-    level_part = _sum(_signs(i_s), raw.period_s)
+    level_part = _sum(of_legs(i_s, knee_A), raw.period_s)
     return Linkage(raw.i, (volts - r_ohm * r_part) * back, back * turn[0], -r_part * back, -level_part * back, raw.axes)

@@ -6,18 +6,21 @@ currents between two bounds instead, for a time that is too short for the rotor 
 """
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from fluxtrue_tools.commission.bursts import FAILURES, Burst, Linkage, Raw, integrate, record
 from fluxtrue_tools.commission.drive import Capture
 from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.noise import Noise, of_phases
 from fluxtrue_tools.commission.plan import First
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
 
-LEVELS = (0.45, 0.6, 0.72, 0.85)  # of i_max: where the ripple does not change the sign of a phase current
+LEVELS = (0.3, 0.45, 0.6, 0.85)  # of i_max: where the ripple does not change the sign of a phase current
 BAND = 0.05  # of i_max: half the width of a level
 STEP = 0.015  # of i_max: change of the current in a period
 SECONDS = 0.05  # of a level
@@ -25,6 +28,10 @@ LEAST_D, LEAST_Q, MOST = 0.08, 0.1, 0.5  # of the largest voltage: more than the
 RESOLUTION_V = 0.005  # rms: what a mean voltage is certain to beyond the noise
 TRIES = 3
 QUIET_RAD = 0.07  # electrical: a level that moved the rotor further is repeated, (CM-26) has the guess of psi_f
+KNEES, KNEE_STEPS = (1e-4, 0.02), 24  # of the largest level: where the legs' knee is looked for
+EXPLAINS = 0.01  # of the squares of the rests: twice what a knee takes away by chance
+NEAR = 1.05  # for the slope over the knee
+COMMON = 3  # unknowns of all levels
 LEAST_PERIODS = 100  # at a level
 UNLIMITED = 1000  # reversals: the time ends a level
 TIME = FAILURES[4]
@@ -41,6 +48,7 @@ class Resistance:
     compensated_V: float
     currents_A: Array  # mean of each level
     volts: Array
+    knee_A: float = 0.0  # of the voltage that a leg loses, (CM-33); 0: none that shows
 
     @property
     def total_V(self) -> float:
@@ -80,35 +88,94 @@ def _local(i: Array) -> Array:
     return np.column_stack((np.ones(len(i)), x, y, x * x, x * y, y * y))
 
 
-def _equations(linkages: list[Linkage], period_s: float, psi_f_Vs: float) -> tuple[Array, Array]:
-    """(CM-12): unknown are resistance, voltage of a leg, error of the mean voltage, and those of each level."""
-    blocks, right = [], []
-    for n, linkage in enumerate(linkages):
-        seconds, local = period_s * np.arange(len(linkage.i)), _local(linkage.i)
-        block = np.zeros((len(seconds), 3 + local.shape[1] * len(linkages)))
-        block[:, :3] = np.column_stack((-linkage.of_r.real, -linkage.of_level.real, seconds))
-        first = 3 + local.shape[1] * n
-        block[:, first : first + local.shape[1]] = local
-        blocks.append(block)
-        right.append(linkage.psi.real - _of_movement(linkage, seconds, psi_f_Vs))
-    return np.vstack(blocks), np.concatenate(right)
+class _Level:
+    """A level's equations, multiplied so that their errors have a variance of one, without what its own unknowns can
+    explain."""
+
+    def __init__(self, raw: Raw, noise: Noise) -> None:
+        self.raw, self.linkage, self._noise = raw, integrate(raw, 0.0), noise
+        self.seconds = raw.period_s * np.arange(len(raw.i))
+        local = noise.whitened(_local(raw.i))
+        self._own = np.linalg.qr(local / np.linalg.norm(local, axis=0))[0]
+        self.spare = len(raw.i) - local.shape[1]
+
+    def left(self, column: Array) -> Array:
+        """What the level's own unknowns cannot explain of a column."""
+        of_all = self._noise.whitened(column[:, None])[:, 0]
+        return np.asarray(of_all - self._own @ (self._own.T @ of_all))
 
 
-def solve(raws: list[Raw], psi_f_Vs: float, compensated_V: float = 0.0) -> Resistance:
-    """All levels at once; compensated_V: by the drive, contained in the voltages."""
-    rows, values = _equations([integrate(raw, 0.0) for raw in raws], raws[0].period_s, psi_f_Vs)
-    scale = np.linalg.norm(rows, axis=0)
-    x, *_ = np.linalg.lstsq(rows / scale, values, rcond=None)
-    left = values - (rows / scale) @ x
-    x = x / scale
-    variance = float(left @ left) / (len(values) - len(x))
-    noise = float(np.sqrt(variance * np.linalg.inv((rows / scale).T @ (rows / scale))[0, 0])) / float(scale[0])
+class _Equations:
+    """(CM-12) of all levels. The common unknowns: resistance, voltage of a leg, error of the mean voltage."""
+
+    def __init__(self, raws: Sequence[Raw], noises: Sequence[Noise], psi_f_Vs: float) -> None:
+        self._levels = [_Level(raw, noise) for raw, noise in zip(raws, noises, strict=True)]
+        self._of_r = self._all(lambda level: -level.linkage.of_r.real)
+        self._seconds = self._all(lambda level: level.seconds)
+        self._values = self._all(
+            lambda level: level.linkage.psi.real - _of_movement(level.linkage, level.seconds, psi_f_Vs)
+        )
+        self.spare = sum(level.spare for level in self._levels) - COMMON
+
+    def _all(self, column: Callable[[_Level], Array]) -> Array:
+        return np.concatenate([level.left(column(level)) for level in self._levels])
+
+    def rows(self, knee_A: float) -> Array:
+        """A column for each common unknown."""
+        of_level = self._all(lambda level: -integrate(level.raw, 0.0, knee_A).of_level.real)
+        return np.column_stack((self._of_r, of_level, self._seconds))
+
+    def solve(self, rows: Array) -> tuple[Array, float]:
+        """The unknowns, and the sum of the squares of what they leave."""
+        scale = np.linalg.norm(rows, axis=0)
+        x = np.linalg.lstsq(rows / scale, self._values, rcond=None)[0] / scale
+        left = self._values - rows @ x
+        return x, float(left @ left)
+
+    def knee_A(self, largest_A: float) -> float:
+        """The one that leaves least, if a knee shows."""
+
+        def left(log: float) -> float:
+            return self.solve(self.rows(math.exp(log)))[1]
+
+        logs = np.log(largest_A * np.geomspace(*KNEES, KNEE_STEPS))
+        best = min(range(1, len(logs) - 1), key=lambda k: left(logs[k]))
+        found = minimize_scalar(left, bounds=(logs[best - 1], logs[best + 1]), method="bounded")
+        (sharp, sharp_left), (soft, _) = (self.solve(self.rows(knee_A)) for knee_A in (0.0, math.exp(found.x)))
+        shows = found.fun < (1.0 - EXPLAINS) * sharp_left and abs(soft[0] - sharp[0]) * largest_A > RESOLUTION_V
+        return math.exp(found.x) if shows else 0.0
+
+    def sigma(self, rows: Array, left: float) -> float:
+        """Of the resistance, by the noise."""
+        scale = np.linalg.norm(rows, axis=0)
+        covariance = left / self.spare * np.linalg.inv((rows / scale).T @ (rows / scale))
+        return math.sqrt(covariance[0, 0]) / float(scale[0])
+
+
+def _noises(raws: Sequence[Raw], noise_A: float, psi_f_Vs: float) -> list[Noise]:
+    """Where a ripple touches zero from one side, noise shifts the mean sign in one direction: the error is one of the
+    whole level. A first solution without it says how large all other errors are."""
+    plain = [Noise(np.ones(len(raw.i)), np.zeros((len(raw.i), 0))) for raw in raws]
+    first = _Equations(raws, plain, psi_f_Vs)
+    x, left = first.solve(first.rows(0.0))
+    sigma = math.sqrt(left / first.spare)
+    return [Noise(np.full(len(raw.i), sigma), x[1] * of_phases(raw, noise_A).real) for raw in raws]
+
+
+def solve(raws: list[Raw], psi_f_Vs: float, compensated_V: float = 0.0, noise_A: float = 0.0) -> Resistance:
+    """All levels at once; compensated_V: by the drive, contained in the voltages; noise_A: of a current's component."""
+    equations = _Equations(raws, _noises(raws, noise_A, psi_f_Vs), psi_f_Vs)
     means = np.array([(raw.i.real.mean(), raw.u.real.mean()) for raw in raws])
-    resolution = RESOLUTION_V / float(np.abs(means[:, 0]).max())
+    largest_A = float(np.abs(means[:, 0]).max())
+    knee_A = equations.knee_A(largest_A)
+    rows = equations.rows(knee_A)
+    x, left = equations.solve(rows)
     if not x[0] > 0.0:
         raise FluxtrueError(f"commission: resistance: {x[0]:.3g} ohm found: the voltage does not grow with the current")
-    return Resistance(float(x[0]), math.hypot(noise, resolution), float(x[1]) - compensated_V, compensated_V,
-                      means[:, 0], means[:, 1])  # fmt: skip
+    if knee_A > 0.0:  # it is an unknown, too
+        rows = np.column_stack((rows, equations.rows(NEAR * knee_A)[:, 1] - rows[:, 1]))
+    sigma = math.hypot(equations.sigma(rows, left), RESOLUTION_V / largest_A)
+    return Resistance(float(x[0]), sigma, float(x[1]) - compensated_V, compensated_V, means[:, 0], means[:, 1], knee_A)
 
 
 def _record(drive: Capture, burst: Burst, known: Nameplate) -> Raw | None:

@@ -23,17 +23,24 @@ def sign_variance(i: Array, noise_A: float) -> Array:
     return np.asarray(np.sum(shares * signs**2, axis=(1, 2)) - means**2)
 
 
+def _of_phase(raw: Raw, noise_A: float, k: int) -> Array:
+    """Change of psi, per volt that a leg loses, by one standard deviation of each uncertain sign of a phase."""
+    axis = np.exp(2j * np.pi * k / 3.0)
+    variance = sign_variance((raw.i * np.exp(1j * raw.theta) * np.conj(axis)).real, noise_A)
+    at = np.flatnonzero(variance > CERTAIN)
+    since = np.arange(len(raw.i))[:, None] > at
+    back = np.exp(-1j * raw.theta)
+    return np.asarray(2.0 / 3.0 * axis * raw.period_s * np.sqrt(variance[at]) * since * back[:, None])
+
+
 def of_signs(raw: Raw, noise_A: float) -> Array:
-    """Change of psi, per volt that a leg loses, by one standard deviation of each uncertain sign; a column for each."""
-    i_s, back = raw.i * np.exp(1j * raw.theta), np.exp(-1j * raw.theta)
-    columns = [np.zeros((len(i_s), 0), complex)]
-    for k in range(3):
-        axis = np.exp(2j * np.pi * k / 3.0)
-        variance = sign_variance((i_s * np.conj(axis)).real, noise_A)
-        at = np.flatnonzero(variance > CERTAIN)
-        since = np.arange(len(i_s))[:, None] > at
-        columns.append(2.0 / 3.0 * axis * raw.period_s * np.sqrt(variance[at]) * since * back[:, None])
-    return np.hstack(columns)
+    """A column for each uncertain sign: their errors are independent."""
+    return np.hstack([_of_phase(raw, noise_A, k) for k in range(3)])
+
+
+def of_phases(raw: Raw, noise_A: float) -> Array:
+    """A column for each phase: all its uncertain signs are wrong in the same direction."""
+    return np.column_stack([_of_phase(raw, noise_A, k).sum(axis=1) for k in range(3)])
 
 
 class Noise:

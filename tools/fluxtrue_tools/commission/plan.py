@@ -2,6 +2,7 @@
 """Which bursts measure the flux map: small ones first, whose inductances choose the voltage of the large ones."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,11 +11,14 @@ from fluxtrue_tools.commission.bursts import Burst, Raw, integrate, record
 from fluxtrue_tools.commission.drive import Capture
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.flux_model import Array
 
 FIRST_VOLTAGE = 0.15  # with the smallest inductance that is allowed for, 0.2 of i_max in a period
 FIRST_CURRENT = 0.1  # of i_max
-VOLTAGES = (0.12, 0.55)
+VOLTAGES = (0.12, 0.68)
 STEP = 0.12  # of i_max: change of the current in a period at most
+BIAS_STEP = 0.15  # of i_max: the same for bursts at a bias, whose steepest change the last one has shown
+FASTER = 2.0  # at most, from one bias to the next
 GROWTH = 1.3  # of the steepest change, from one level to the next
 LEVELS = (0.35, 0.65, 0.93)  # of i_max
 TOP_D = 0.1  # of i_max: the magnetising side
@@ -23,9 +27,9 @@ BIASES = (0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.85)  # of -i_max
 BIAS_SLOWER = 3.5  # the current in d changes more slowly than that in q, and stays in its band
 LOST_MAX = 2  # bursts of all that may fail
 TRAVEL = 1.5  # of the time to the bias without saturation
-REVERSALS_D, REVERSALS_Q = 6, 5
-FIRST = (0.4, 0.9)  # share of its bound at which the first half wave may end
-BEGUN = 0.1  # of the range of the impulse: beyond the noise
+REVERSALS_D, REVERSALS_Q = 6, 3
+MAGNET = 3.0  # times the guess of the magnet's flux linkage at most
+FIRST = (0.2, 0.9)  # share of its bound at which the first half wave may end
 
 
 @dataclass(frozen=True)
@@ -69,9 +73,9 @@ def first(drive: Capture, known: Nameplate, losses: Losses) -> First:
     return First(_inductance(along_d, losses, of_q=False), _inductance(along_q, losses, of_q=True), volts)
 
 
-def _voltage(steepest_A: float, i_max_A: float) -> float:
-    """The share at which the current changes by STEP in a period; steepest_A: its change with a share of 1."""
-    return float(np.clip(STEP * i_max_A / steepest_A, *VOLTAGES))
+def _voltage(steepest_A: float, i_max_A: float, step: float = STEP) -> float:
+    """The share at which the current changes by a step in a period; steepest_A: its change with a share of 1."""
+    return float(np.clip(step * i_max_A / steepest_A, *VOLTAGES))
 
 
 def _steepest(raw: Raw, share: float, of_q: bool) -> float:
@@ -80,17 +84,66 @@ def _steepest(raw: Raw, share: float, of_q: bool) -> float:
     return float(np.abs(np.diff(i)).max()) / share
 
 
-def _balanced(share: float, raw: Raw) -> float:
-    """The share of its bound at which the first half wave of q should have ended: (CM-27). The impulse is about the
-    sum of i_q, and that of a half wave grows with about the square of its largest current."""
-    impulse = np.cumsum(raw.i.imag)
-    both = float(np.ptp(impulse))  # the second half wave
-    begins = np.sign(impulse[np.argmax(np.abs(impulse) > BEGUN * both)])
-    first_one = max(float((begins * impulse).max()), BEGUN * both)
-    return float(np.clip(share * math.sqrt(0.5 * both / first_one), *FIRST))
+def _steepest_within(raw: Raw, share: float, top_A: float) -> float:
+    """The largest change of the current along q in a period that begins or ends within a bound, for a share of 1."""
+    i = raw.i.imag
+    changes = np.abs(np.diff(i))
+    inside = np.minimum(np.abs(i[1:]), np.abs(i[:-1])) < top_A
+    return float(changes[inside].max()) / share
 
 
-def _ladder(drive: Capture, known: Nameplate, steepest_A: float, of_q: bool) -> tuple[list[Raw], float]:
+def _linkages(raw: Raw, losses: Losses) -> tuple[Array, Array]:
+    """What the voltages of the axes in use show, and what the magnet's at the start is multiplied by (CM-11)."""
+    linkage = integrate(raw, losses.r_ohm)
+    psi, (of_d, of_q) = linkage.psi + losses.level_V * linkage.of_level, raw.axes
+    return of_d * psi.real + 1j * of_q * psi.imag, linkage.turned
+
+
+def _torque(psi: Array, i: Array) -> Array:
+    """Of 1.5 times the pole pairs, in V·s·A."""
+    return np.asarray((np.conj(psi) * i).imag)
+
+
+def magnet_Vs(raws: Sequence[Raw], losses: Losses, guess_Vs: float) -> float:
+    """The magnet's flux linkage, by the share that it has in the movements of the rotor: (CM-34)."""
+    rows, moved = [], []
+    for raw in raws:
+        psi, turned = _linkages(raw, losses)
+        of_parts = np.column_stack((_torque(turned, raw.i), _torque(psi, raw.i)))
+        rows.append(raw.period_s**2 * np.cumsum(np.cumsum(of_parts, axis=0), axis=0))
+        moved.append(raw.theta - raw.theta[0])
+    of_magnet, of_others = np.linalg.lstsq(np.vstack(rows), np.concatenate(moved), rcond=None)[0]
+    found = of_magnet / of_others if of_others > 0.0 else guess_Vs
+    return float(np.clip(found, guess_Vs / MAGNET, guess_Vs * MAGNET))
+
+
+def _rise(i_q: Array) -> slice:
+    """From zero to the largest current of a half wave."""
+    top = int(np.argmax(np.abs(i_q)))
+    other = np.flatnonzero(i_q[:top] * i_q[top] <= 0.0)
+    return slice(int(other[-1]) + 1 if len(other) else 0, top + 1)
+
+
+def balanced(
+    raw: Raw, losses: Losses, psi_f_Vs: float, top_A: float, more_A: float = 0.0, more_Vs: float = 0.0
+) -> float:
+    """The share of its bound at which the first half wave along q ends with half of the impulse of the others: (CM-27).
+
+    top_A             bound of the next burst
+    more_A, more_Vs   current and flux linkage along d that the next burst has more than this one
+    """
+    psi, turned = _linkages(raw, losses)
+    rise = _rise(raw.i.imag)
+    torque = _torque(psi + psi_f_Vs * turned + more_Vs, raw.i + more_A)[rise]
+    i_q = raw.i.imag[rise]
+    impulse = np.maximum.accumulate(np.cumsum(torque * np.sign(i_q[-1])))
+    reached = np.maximum.accumulate(np.abs(i_q))
+    half = 0.5 * float(np.interp(top_A, reached, impulse))
+    return float(np.clip(np.interp(half, impulse, reached) / min(top_A, float(reached[-1])), *FIRST))
+
+
+def _ladder(drive: Capture, known: Nameplate, losses: Losses, steepest_A: float,
+            of_q: bool) -> tuple[list[Raw], float]:  # fmt: skip
     """Larger and larger currents along one axis: each level's steepest change limits the voltage of the next."""
     raws: list[Raw] = []
     i_max_A = known.i_max_A
@@ -98,8 +151,11 @@ def _ladder(drive: Capture, known: Nameplate, steepest_A: float, of_q: bool) -> 
         top = level * i_max_A
         share = _voltage(GROWTH * steepest_A, i_max_A)
         free = (-top, top)
-        burst = (Burst(0.0, share, free, (-top, top), REVERSALS_Q) if of_q else
-                 Burst(share, 0.0, (-top, TOP_D * i_max_A), free, REVERSALS_D))  # fmt: skip
+        if of_q:
+            half = balanced(raws[-1], losses, known.psi_f_Vs, top) if raws else Burst.first
+            burst = Burst(0.0, share, free, free, REVERSALS_Q, first=half)
+        else:
+            burst = Burst(share, 0.0, (-top, TOP_D * i_max_A), free, REVERSALS_D)
         raws.append(record(drive, burst, known))
         if raws[-1].failure:
             raise FluxtrueError(
@@ -109,20 +165,23 @@ def _ladder(drive: Capture, known: Nameplate, steepest_A: float, of_q: bool) -> 
     return raws, steepest_A
 
 
-def sweep(drive: Capture, found: First, known: Nameplate) -> list[Raw]:
+def sweep(drive: Capture, found: First, known: Nameplate, losses: Losses) -> list[Raw]:
     """d alone, q alone, then q at each bias of d."""
     period_s, i_max_A = drive.period_s, known.i_max_A
-    along_d, steep_d = _ladder(drive, known, found.volts * period_s / found.l_d_H, of_q=False)
-    along_q, steep_q = _ladder(drive, known, found.volts * period_s / found.l_q_H, of_q=True)
+    along_d, steep_d = _ladder(drive, known, losses, found.volts * period_s / found.l_d_H, of_q=False)
+    along_q, _ = _ladder(drive, known, losses, found.volts * period_s / found.l_q_H, of_q=True)
     raws = [*along_d, *along_q]
-    v_d, v_q = _voltage(BIAS_SLOWER * steep_d, i_max_A), _voltage(steep_q, i_max_A)
+    v_d = _voltage(BIAS_SLOWER * steep_d, i_max_A)
     per_period = v_d * found.volts * period_s / found.l_d_H
-    band = BAND * i_max_A
-    share = _balanced(Burst.first, along_q[-1])
+    band, v_q = BAND * i_max_A, float(np.abs(along_q[-1].u.imag).max()) / found.volts
+    centre = 0.0
     for bias in BIASES:
+        more_A = -bias * i_max_A - centre
         centre, delay = -bias * i_max_A, math.ceil(TRAVEL * bias * i_max_A / per_period)
         top = math.sqrt((LEVELS[-1] * i_max_A) ** 2 - (abs(centre) + band) ** 2)
+        v_q = min(_voltage(_steepest_within(raws[-1], v_q, top), i_max_A, BIAS_STEP), FASTER * v_q)
+        psi_f_Vs = magnet_Vs(raws[len(along_d) :], losses, known.psi_f_Vs)
+        share = balanced(raws[-1], losses, psi_f_Vs, top, more_A, found.l_d_H * more_A)
         raws.append(record(drive, Burst(v_d, v_q, (centre - band, centre + band), (-top, top), REVERSALS_Q, delay,
                                         share), known))  # fmt: skip
-        share = _balanced(share, raws[-1])
     return raws

@@ -140,17 +140,18 @@ def _resistance(drive: Capture, found: Found, known: Nameplate) -> None:
     found.levels = levels.measure(drive, known, found.first)
     found.balance = balance.measure(found.levels)
     alike = [found.balance.corrected(raw) for raw in found.levels]
-    found.resistance = levels.solve(alike, known.psi_f_Vs, drive.get("compensation_V"))
+    found.resistance = levels.solve(alike, known.psi_f_Vs, drive.get("compensation_V"), found.balance.noise_A)
     found.first = plan.first(drive, known, _losses(found, known))
 
 
 def _map(drive: Capture, found: Found, known: Nameplate) -> None:
     assert found.resistance is not None and found.first is not None
     _enable(drive)
+    losses = plan.Losses(found.resistance.r_ohm, found.resistance.total_V)
     compensated = drive.get("dead_time_compensation")
     drive.set("dead_time_compensation", 0.0)  # by the sign of currents with an offset: it can be computed better later
     try:
-        found.bursts = plan.sweep(drive, found.first, known)
+        found.bursts = plan.sweep(drive, found.first, known, losses)
     finally:
         drive.set("dead_time_compensation", compensated)
     used = [raw for raw in found.bursts if raw.failure in ("", MOVED)]  # up to its end by a movement a burst is valid
@@ -161,7 +162,7 @@ def _map(drive: Capture, found: Found, known: Nameplate) -> None:
     alike = [found.balance.corrected(raw) for raw in used]
     error = surface.MEASURED if found.spun is not None else surface.GIVEN if known.psi_f_source else surface.GUESSED
     found.surface = surface.fit(alike, found.balance.noise_A, known.i_max_A, found.resistance.r_ohm,
-                                (known.psi_f_Vs, error), found.resistance.total_V)  # fmt: skip
+                                (known.psi_f_Vs, error), found.resistance.total_V, found.resistance.knee_A)  # fmt: skip
 
 
 STEPS = (

@@ -81,9 +81,9 @@ def _parts(values: Array) -> Array:
 class _Fit:
     """Rows of all bursts; the unknowns are scaled so that each is about 1."""
 
-    def __init__(self, raws: Sequence[Raw], i_max_A: float, r_ohm: float) -> None:
+    def __init__(self, raws: Sequence[Raw], i_max_A: float, r_ohm: float, knee_A: float) -> None:
         self.raws, self.i_max, self.r = raws, i_max_A, r_ohm
-        self.bursts = [integrate(raw, r_ohm) for raw in raws]
+        self.bursts = [integrate(raw, r_ohm, knee_A) for raw in raws]
         self.basis = Basis(_plane(self.bursts, i_max_A), INTERVALS)
         self.scale = float(np.sqrt(np.mean(np.concatenate([np.abs(b.psi) ** 2 for b in self.bursts]))))
         zero = np.zeros(1)
@@ -160,13 +160,14 @@ class _Fit:
 
 
 def fit(raws: Sequence[Raw], noise_A: float, i_max_A: float, r_ohm: float, magnet: tuple[float, float],
-        level_V: float) -> Surface:  # fmt: skip
+        level_V: float, knee_A: float = 0.0) -> Surface:  # fmt: skip
     """All unknowns at once, twice: the first map says how much flux linkage the noise of a current is.
 
     noise_A   of one component of a sample's current
     magnet    its flux linkage, V·s, and the relative error of it
+    knee_A    of the voltage that a leg loses
     """
-    work = _Fit(raws, i_max_A, r_ohm)
+    work = _Fit(raws, i_max_A, r_ohm, knee_A)
     bursts = range(len(raws))
     _, x = work.solve((work.guessed_noise(n) for n in bursts), magnet, level_V)
     model = work.energy(x)
