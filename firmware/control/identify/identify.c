@@ -24,7 +24,7 @@ void identify_reset(const identify_config_t *config, identify_state_t *state)
 
 q31_t identify_value(const identify_config_t *config, const identify_state_t *state, identify_index_t index)
 {
-    return fx_shl_q31(fx_mulhi(config->sigma[index], state->kalman.x_q27[index]), 5); /* Q31 * Q27 = Q26 */
+    return fx_sat_bits(fx_mulhi(config->sigma[index], state->kalman.x_q27[index]), 27) * 32; /* Q31 * Q27 = Q26 */
 }
 
 /* R = r0 (1 + alpha (theta - 20 C)); without a sensor the last one holds (ID-13). */
@@ -133,8 +133,10 @@ static void update_local_flux_error(const identify_config_t *config, identify_st
         const q16_t gain = in->point->omega / fx_max_s32(square >> 15, 1); /* Q31/Q15 */
         target = (dq_q30_t){fx_mul_gain_q31(gain, e.q), fx_neg_q31(fx_mul_gain_q31(gain, e.d))};
     }
-    state->kept.local.d += fx_mul_q31(config->local_rate, fx_sub_q31(target.d, state->kept.local.d));
-    state->kept.local.q += fx_mul_q31(config->local_rate, fx_sub_q31(target.q, state->kept.local.q));
+    const int32_t twice = fx_add_q31(config->local_rate, config->local_rate);
+    dq_q30_t *local = &state->kept.local;
+    local->d = fx_mulhi_add(local->d, twice, fx_sub_q31(target.d, local->d));
+    local->q = fx_mulhi_add(local->q, twice, fx_sub_q31(target.q, local->q));
 }
 
 /* The tables' flux and magnetising current, corrected by all parameters and by the local flux error (ID-15). */
