@@ -3,6 +3,9 @@
 
 #include "bus/signals.h"
 #include "comm/e2e.h"
+#include "fx/format.h"
+
+#define SLOTS 10U /* milliseconds */
 
 typedef struct {
     uint16_t id;
@@ -23,11 +26,38 @@ static const tx_message_t messages[] = {
 
 _Static_assert(MESSAGES <= CAN_TX_MESSAGES_MAX, "each message has space for its counter");
 
+/* Every cycle is a multiple of ten milliseconds: a message can be due in one of ten only. One bit for each message. */
+enum {
+#define NUMBER(name, NAME) NUMBER_##name,
+    BUS_SENT(NUMBER)
+#undef NUMBER
+};
+#define IN_SLOT(slot, name, NAME) | (BUS_##NAME##_PHASE_MS % SLOTS == (slot) ? 1U << NUMBER_##name : 0U)
+#define IN_0(name, NAME) IN_SLOT(0U, name, NAME)
+#define IN_1(name, NAME) IN_SLOT(1U, name, NAME)
+#define IN_2(name, NAME) IN_SLOT(2U, name, NAME)
+#define IN_3(name, NAME) IN_SLOT(3U, name, NAME)
+#define IN_4(name, NAME) IN_SLOT(4U, name, NAME)
+#define IN_5(name, NAME) IN_SLOT(5U, name, NAME)
+#define IN_6(name, NAME) IN_SLOT(6U, name, NAME)
+#define IN_7(name, NAME) IN_SLOT(7U, name, NAME)
+#define IN_8(name, NAME) IN_SLOT(8U, name, NAME)
+#define IN_9(name, NAME) IN_SLOT(9U, name, NAME)
+static const uint16_t in_slot[SLOTS] = {
+    0U BUS_SENT(IN_0), 0U BUS_SENT(IN_1), 0U BUS_SENT(IN_2), 0U BUS_SENT(IN_3), 0U BUS_SENT(IN_4),
+    0U BUS_SENT(IN_5), 0U BUS_SENT(IN_6), 0U BUS_SENT(IN_7), 0U BUS_SENT(IN_8), 0U BUS_SENT(IN_9),
+};
+#define IN_TENS(name, NAME) && BUS_##NAME##_CYCLE_MS % SLOTS == 0U
+_Static_assert(1 BUS_SENT(IN_TENS), "whole tens of milliseconds");
+
 void can_tx_begin(can_tx_t *tx, uint32_t passed_ms)
 {
-    tx->time_ms += passed_ms;
+    tx->pending = 0;
+    for (uint32_t n = 0; n < passed_ms; n++) {
+        tx->time_ms++;
+        tx->pending |= in_slot[tx->time_ms % SLOTS];
+    }
     tx->passed_ms = (uint8_t)passed_ms;
-    tx->next = 0;
 }
 
 static bool is_due(const can_tx_t *tx, const tx_message_t *message)
@@ -36,12 +66,29 @@ static bool is_due(const can_tx_t *tx, const tx_message_t *message)
     return time_ms % message->cycle_ms < tx->passed_ms;
 }
 
+/* The first message that is pending. */
+static const tx_message_t *next(const can_tx_t *tx)
+{
+    const uint32_t lowest = tx->pending & (0U - tx->pending);
+    return &messages[31U - fx_leading_zeros(lowest)];
+}
+
 bool can_tx_due(can_tx_t *tx)
 {
-    while (tx->next < MESSAGES && !is_due(tx, &messages[tx->next])) {
-        tx->next++;
+    while (tx->pending != 0U && !is_due(tx, next(tx))) {
+        tx->pending = (uint16_t)(tx->pending & (tx->pending - 1U));
     }
-    return tx->next < MESSAGES;
+    return tx->pending != 0U;
+}
+
+bool can_tx_may_send_temperatures(const can_tx_t *tx)
+{
+    return (tx->pending & 1U << NUMBER_inv_temperatures) != 0U;
+}
+
+bool can_tx_may_send_identification(const can_tx_t *tx)
+{
+    return (tx->pending & 1U << NUMBER_inv_identification) != 0U;
 }
 
 tx_result_t can_tx_next(can_tx_t *tx, const telemetry_t *telemetry, can_frame_t *frame)
@@ -49,8 +96,8 @@ tx_result_t can_tx_next(can_tx_t *tx, const telemetry_t *telemetry, can_frame_t 
     if (!can_tx_due(tx)) {
         return TX_NONE;
     }
-    const tx_message_t *message = &messages[tx->next];
-    tx->next++;
+    const tx_message_t *message = next(tx);
+    tx->pending = (uint16_t)(tx->pending & (tx->pending - 1U));
     *frame = (can_frame_t){.id = message->id, .length = MESSAGE_LENGTH};
     if (!message->encode(telemetry, frame->data)) {
         return TX_NOT_A_NUMBER;

@@ -19,14 +19,17 @@ typedef enum { TX_NONE = 0, TX_FRAME, TX_NOT_A_NUMBER } tx_result_t;
 
 typedef struct {
     uint32_t time_ms;
+    uint16_t pending;                     /* messages still to be checked in this step, one bit each */
     uint8_t passed_ms;                    /* in this step */
-    uint8_t next;                         /* next message to be checked in this step */
     uint8_t counter[CAN_TX_MESSAGES_MAX]; /* end-to-end protection of each message that has it */
 } can_tx_t;
 
 void can_tx_begin(can_tx_t *tx, uint32_t passed_ms);
 /** Whether can_tx_next() will return a frame; it may be asked at any time in between. */
 bool can_tx_due(can_tx_t *tx);
+/** Whether this step may send these messages; otherwise what only they contain need not be collected. */
+bool can_tx_may_send_temperatures(const can_tx_t *tx);
+bool can_tx_may_send_identification(const can_tx_t *tx);
 tx_result_t can_tx_next(can_tx_t *tx, const telemetry_t *telemetry, can_frame_t *frame);
 
 #endif

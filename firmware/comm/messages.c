@@ -4,6 +4,9 @@
 #include "bus/signals.h"
 #include "types/version.h"
 
+#define FNV_START 2166136261U
+#define FNV_PRIME 16777619U
+
 bool message_inv_status(const telemetry_t *t, uint8_t *data)
 {
     struct bus_inv_status_t m = {0};
@@ -133,6 +136,15 @@ bool message_inv_diag_task(const telemetry_t *t, uint8_t *data)
     return finite && bus_inv_diag_task_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }
 
+static uint32_t hash(const char *name)
+{
+    uint32_t h = FNV_START;
+    for (; *name != '\0'; name++) {
+        h = (h ^ (uint8_t)*name) * FNV_PRIME;
+    }
+    return h;
+}
+
 bool message_inv_version(const telemetry_t *t, uint8_t *data)
 {
     struct bus_inv_version_t m = {0};
@@ -140,6 +152,6 @@ bool message_inv_version(const telemetry_t *t, uint8_t *data)
     bus_inv_version_put_minor(&m, FLUXTRUE_VERSION_MINOR);
     bus_inv_version_put_patch(&m, FLUXTRUE_VERSION_PATCH);
     bus_inv_version_put_interface(&m, INTERFACE_VERSION);
-    bus_inv_version_put_motor_id(&m, t->motor_id);
+    bus_inv_version_put_motor_id(&m, hash(t->motor_name));
     return bus_inv_version_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }

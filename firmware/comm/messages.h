@@ -62,8 +62,9 @@ typedef struct {
     float winding_C, inverter_C;
     bool winding_valid, inverter_valid;
     uint32_t drive_faults, ecu_faults, first_fault, fault_count;
-    uint32_t motor_check; /* motor_check_t */
-    uint32_t motor_id, interface_hash;
+    uint32_t motor_check;   /* motor_check_t */
+    const char *motor_name; /* transmitted as its hash */
+    uint32_t interface_hash;
     diagnostics_t diagnostics;
 } telemetry_t;
 

@@ -195,7 +195,7 @@ static void send_frames(ecu_t *ecu)
     if (!can_tx_due(&ecu->tx)) {
         return;
     }
-    telemetry_read(&ecu->drive, &telemetry);
+    telemetry_read(&ecu->drive, &ecu->tx, &telemetry);
     ecu_telemetry(ecu, &telemetry);
     telemetry.diagnostics.lost_frames = hal_can_lost();
     telemetry.diagnostics.bus_off = hal_can_bus_off();

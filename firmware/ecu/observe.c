@@ -99,8 +99,9 @@ static uint32_t derating_reason(const ecu_t *ecu)
     if (are_limits_lost(ecu)) {
         return DERATING_REASON_BATTERY_LIMITS_LOST;
     }
-    for (unsigned n = 0; n < sizeof reasons / sizeof reasons[0]; n++) {
-        if ((ecu->drive.task.derating & reasons[n].derating) != 0U) {
+    const uint32_t derating = ecu->drive.task.derating & ~(uint32_t)(DERATING_REQUEST | DERATING_REACH);
+    for (unsigned n = 0; derating != 0U && n < sizeof reasons / sizeof reasons[0]; n++) {
+        if ((derating & reasons[n].derating) != 0U) {
             return reasons[n].reason;
         }
     }

@@ -189,7 +189,7 @@ static uint32_t conditions(const supervisor_t *s, const supervisor_in_t *in)
 
 static void take_transition(supervisor_t *s, uint32_t now)
 {
-    for (uint32_t n = 0; n < supervisor_transitions; n++) {
+    for (uint32_t n = supervisor_first[s->state]; n < supervisor_first[s->state + 1U]; n++) {
         const transition_t *row = &supervisor_table[n];
         if (row->from == s->state && (row->when & now) == row->when) {
             s->state = row->to;

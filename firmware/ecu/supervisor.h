@@ -131,7 +131,8 @@ typedef struct {
 } supervisor_t;
 
 extern const transition_t supervisor_table[];
-extern const uint32_t supervisor_transitions;
+/** The first row of each state, and behind the last state the number of rows. */
+extern const uint8_t supervisor_first[STATES + 1];
 extern const state_outputs_t supervisor_outputs[STATES];
 
 void supervisor_step(supervisor_t *supervisor, const supervisor_in_t *in);

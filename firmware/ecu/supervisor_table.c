@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "ecu/supervisor.h"
 
-/* The first row that applies is taken, so urgent transitions come first. docs/howto/can.md contains a drawing of it.
+/* The first row that applies is taken, so urgent transitions come first; the rows of a state follow each other in the
+ * order of the states. docs/howto/can.md contains a drawing of it.
  * Ready, run, derate and safe state hold contactor and gate supply. Every way out of these four needs WHEN_SLOW: a
  * machine that turns fast would charge the dc link through the diodes. */
 const transition_t supervisor_table[] = {
@@ -32,7 +33,14 @@ const transition_t supervisor_table[] = {
     {STATE_DISCHARGE, WHEN_DISCHARGE_FAILED, STATE_FAULT},
 };
 
-const uint32_t supervisor_transitions = sizeof supervisor_table / sizeof supervisor_table[0];
+#define ROWS 25
+
+const uint8_t supervisor_first[STATES + 1] = {
+    [STATE_INIT] = 0,    [STATE_STANDBY] = 2, [STATE_PRECHARGE] = 4,   [STATE_READY] = 7,      [STATE_RUN] = 11,
+    [STATE_DERATE] = 15, [STATE_FAULT] = 20,  [STATE_SAFE_STATE] = 19, [STATE_DISCHARGE] = 22, [STATES] = ROWS,
+};
+
+_Static_assert(sizeof supervisor_table / sizeof supervisor_table[0] == ROWS, "the rows of the last state end here");
 
 const state_outputs_t supervisor_outputs[STATES] = {
     [STATE_PRECHARGE] = {.precharge = true},

@@ -6,8 +6,6 @@
 #include "hal/temperature.h"
 #include "types/si.h"
 
-#define FNV_START 2166136261U
-#define FNV_PRIME 16777619U
 #define V_DC_MIN_V 1.0F
 
 static void read_point(const drive_t *drive, const sample_t *sample, telemetry_t *t)
@@ -54,26 +52,21 @@ static void read_temperatures(telemetry_t *t)
     t->inverter_C = t->inverter_valid ? (float)inverter / 10.0F : 0.0F;
 }
 
-static uint32_t hash(const char *name)
-{
-    uint32_t h = FNV_START;
-    for (; *name != '\0'; name++) {
-        h = (h ^ (uint8_t)*name) * FNV_PRIME;
-    }
-    return h;
-}
-
-void telemetry_read(const drive_t *drive, telemetry_t *telemetry)
+void telemetry_read(const drive_t *drive, const can_tx_t *tx, telemetry_t *telemetry)
 {
     const sample_t sample = sample_box_read(&drive->samples);
     telemetry->scales = &drive->motor->bus_scales;
     read_point(drive, &sample, telemetry);
     read_torque(drive, telemetry);
-    read_identification(drive, telemetry);
-    read_temperatures(telemetry);
+    if (can_tx_may_send_identification(tx)) {
+        read_identification(drive, telemetry);
+    }
+    if (can_tx_may_send_temperatures(tx)) {
+        read_temperatures(telemetry);
+    }
     telemetry->drive_faults = drive->fast.faults;
     telemetry->motor_check = (uint32_t)drive_motor_check(drive);
     telemetry->diagnostics.isr_overruns = mrai_overruns(drive);
-    telemetry->motor_id = hash(drive->motor->name);
+    telemetry->motor_name = drive->motor->name;
     telemetry->interface_hash = drive->motor->interface_hash;
 }

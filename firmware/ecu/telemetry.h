@@ -8,9 +8,10 @@
  * Range    every state of a drive
  * Errors   i_dc is 0 below 1 V
  * Context  1 kHz task; single precision, never in an interrupt */
-#include "comm/messages.h"
+#include "comm/can_tx.h"
 #include "drive/drive.h"
 
-void telemetry_read(const drive_t *drive, telemetry_t *telemetry);
+/** tx: what only the messages of identification and temperatures contain is read only if it may send them. */
+void telemetry_read(const drive_t *drive, const can_tx_t *tx, telemetry_t *telemetry);
 
 #endif

@@ -45,7 +45,7 @@ typedef struct {
     q15_t omega_min, i_min;                                    /* no parameter update below either */
     q15_t i_smooth;      /* below it the assumed voltage drop decreases with the current */
     q15_t local_corner;  /* speed at which voltage and flux errors weigh the same */
-    q31_t local_rate;    /* of the local flux error's filter, per step */
+    q31_t local_rate;    /* of the local flux error's filter, per step; below 1/2 */
     q16_t limited_noise; /* share of the noise that each period with limited pulses adds: 5/N */
     q15_t mismatch_rate; /* first-order coefficient of the mismatch share, per update */
     q15_t torque_min;    /* the uncertainty is relative to the torque, and to this value at smaller torque */

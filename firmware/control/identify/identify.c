@@ -2,6 +2,7 @@
 #include "control/identify/identify.h"
 
 #include "control/identify/q30.h"
+#include "fx/codegen.h"
 #include "fx/div.h"
 #include "signal/counter.h"
 
@@ -9,6 +10,7 @@
 #define REFERENCE_dC 200   /* 20 C */
 #define MISMATCH_MAX Q15(0.5)
 #define GATE_EXCEEDED_MAX 25 /* ten times as many steps fit into a byte */
+#define PREDICTION_STEP 2U   /* of the next update: spread, so that no step computes much more than the others */
 
 typedef struct {
     identify_flux_t at; /* identified */
@@ -24,7 +26,7 @@ void identify_reset(const identify_config_t *config, identify_state_t *state)
 
 q31_t identify_value(const identify_config_t *config, const identify_state_t *state, identify_index_t index)
 {
-    return fx_shl_q31(fx_mulhi(config->sigma[index], state->kalman.x_q27[index]), 5); /* Q31 * Q27 = Q26 */
+    return fx_sat_bits(fx_mulhi(config->sigma[index], state->kalman.x_q27[index]), 27) * 32; /* Q31 * Q27 = Q26 */
 }
 
 /* R = r0 (1 + alpha (theta - 20 C)); without a sensor the last one holds (ID-13). */
@@ -67,20 +69,45 @@ static void average_step(const identify_config_t *config, identify_state_t *stat
     state->steps++;
 }
 
-/* The measurements of both axes, one after the other: the second innovation takes the first update into account. */
-static void update_parameters(const identify_config_t *config, identify_state_t *state)
+/* The measurement of one axis. Not inlined: one copy takes less memory. */
+static FX_NOT_INLINED uint32_t update(identify_state_t *state, const jacobian_row_t *row, int32_t e_q30)
 {
-    kalman_t *kalman = &state->kalman;
-    const identify_measurement_t *mean = &state->mean;
-    const int32_t output_before = kalman_output(kalman, &mean->q);
-    const uint32_t d = kalman_update(kalman, &mean->d, mean->e.d, mean->noise_q30);
-    const int32_t change = fx_sub_q31(kalman_output(kalman, &mean->q), output_before);
-    const uint32_t both = d | kalman_update(kalman, &mean->q, fx_sub_q31(mean->e.q, change), mean->noise_q30);
-    const uint32_t exceeded = count_up_to(state->gate_exceeded_updates, GATE_EXCEEDED_MAX);
-    state->gate_exceeded_updates = ((d & KALMAN_GATE_EXCEEDED) != 0U) ? (uint8_t)exceeded : 0U;
-    state->kept.clamped = (both & KALMAN_CLAMPED) != 0U;
-    const int32_t error = fx_sat_q15_word(((both != 0U) ? Q15_MAX : 0) - state->kept.mismatch_share);
-    state->kept.mismatch_share = fx_add_q15(state->kept.mismatch_share, fx_mul_q15(config->mismatch_rate, error));
+    identify_check_parameters(state);
+    const uint32_t report = kalman_update(&state->kalman, row, e_q30, state->mean.noise_q30);
+    identify_seal_parameters(state);
+    return report;
+}
+
+/* Ends an update's ten steps. The q axis, whose turn is in the next step, takes the d axis into account. */
+static void update_d_axis(identify_state_t *state)
+{
+    identify_measurement_t *mean = &state->mean;
+    uint32_t exceeded = 0;
+    if (state->kept.update_valid) {
+        const int32_t output_before = kalman_output(&state->kalman, &mean->q);
+        const uint32_t report = update(state, &mean->d, mean->e.d);
+        const int32_t change = fx_sub_q31(kalman_output(&state->kalman, &mean->q), output_before);
+        mean->e.q = fx_sub_q31(mean->e.q, change);
+        state->kept.clamped = (report & KALMAN_CLAMPED) != 0U;
+        if ((report & KALMAN_GATE_EXCEEDED) != 0U) {
+            exceeded = count_up_to(state->gate_exceeded_updates, GATE_EXCEEDED_MAX);
+        }
+    }
+    state->gate_exceeded_updates = (uint8_t)exceeded;
+    state->steps = 0;
+}
+
+/* Before the first step of the next update. After a reset no measurement is valid. */
+static void update_q_axis(const identify_config_t *config, identify_state_t *state)
+{
+    if (state->kept.update_valid) {
+        const uint32_t report = update(state, &state->mean.q, state->mean.e.q);
+        const uint32_t of_both = report | state->kept.clamped | state->gate_exceeded_updates;
+        state->kept.clamped |= (report & KALMAN_CLAMPED) != 0U;
+        const int32_t error = fx_sat_q15_word(((of_both != 0U) ? Q15_MAX : 0) - state->kept.mismatch_share);
+        state->kept.mismatch_share = fx_add_q15(state->kept.mismatch_share, fx_mul_q15(config->mismatch_rate, error));
+    }
+    state->mean = (identify_measurement_t){.noise_q30 = 0};
 }
 
 /* The torque's variance is compared with two levels: well below the variance of the tables alone, or small against the
@@ -106,22 +133,6 @@ static void update_confidence(const identify_config_t *config, identify_state_t 
     state->kept.confidence = (q15_t)fx_usat_q15_word(state->kept.confidence + step);
 }
 
-static void kalman_step(const identify_config_t *config, identify_state_t *state, const identify_model_t *model,
-                        int32_t torque)
-{
-    identify_check_parameters(state);
-    if (state->kept.update_valid) {
-        update_parameters(config, state);
-    } else {
-        state->gate_exceeded_updates = 0;
-    }
-    kalman_predict(config, &state->kalman, state->kept.r_known);
-    identify_seal_parameters(state);
-    update_confidence(config, state, model, torque);
-    state->mean = (identify_measurement_t){.noise_q30 = 0};
-    state->steps = 0;
-}
-
 /* w/(w^2 + w_x^2) times the residual, into a first-order filter (ID-16). */
 static void update_local_flux_error(const identify_config_t *config, identify_state_t *state, const identify_in_t *in,
                                     dq_q30_t e)
@@ -133,8 +144,10 @@ static void update_local_flux_error(const identify_config_t *config, identify_st
         const q16_t gain = in->point->omega / fx_max_s32(square >> 15, 1); /* Q31/Q15 */
         target = (dq_q30_t){fx_mul_gain_q31(gain, e.q), fx_neg_q31(fx_mul_gain_q31(gain, e.d))};
     }
-    state->kept.local.d += fx_mul_q31(config->local_rate, fx_sub_q31(target.d, state->kept.local.d));
-    state->kept.local.q += fx_mul_q31(config->local_rate, fx_sub_q31(target.q, state->kept.local.q));
+    const int32_t twice = fx_add_q31(config->local_rate, config->local_rate);
+    dq_q30_t *local = &state->kept.local;
+    local->d = fx_mulhi_add(local->d, twice, fx_sub_q31(target.d, local->d));
+    local->q = fx_mulhi_add(local->q, twice, fx_sub_q31(target.q, local->q));
 }
 
 /* The tables' flux and magnetising current, corrected by all parameters and by the local flux error (ID-15). */
@@ -159,6 +172,9 @@ static corrected_t correct(const identify_config_t *config, const identify_state
 identify_out_t identify_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in)
 {
     identify_check_kept(state);
+    if (state->steps == 0U) {
+        update_q_axis(config, state);
+    }
     resistance_prior(config, state, in);
     identify_model_t model;
     identify_model(config, in->point, in->tables, state->kept.r_prior, &model);
@@ -169,8 +185,15 @@ identify_out_t identify_step(const identify_config_t *config, identify_state_t *
     const corrected_t now = correct(config, state, &model);
     const int32_t torque = identify_mean_torque(config, &in->tables->inductances, in->point->chord_q30, &now.at);
     const identify_out_t out = {fx_round_q15_word(torque), fx_round_q15_word(now.magnet_q30)};
-    if (state->steps >= IDENTIFY_STEPS) {
-        kalman_step(config, state, &model, out.torque);
+    if (state->steps == PREDICTION_STEP) {
+        identify_check_parameters(state);
+        kalman_predict(config, &state->kalman, state->kept.r_known);
+        identify_seal_parameters(state);
+        update_confidence(config, state, &model, out.torque);
+    } else if (state->steps >= IDENTIFY_STEPS) {
+        update_d_axis(state);
+    } else {
+        /* the other steps only add to the mean */
     }
     identify_seal_kept(state);
     return out;

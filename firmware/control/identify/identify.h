@@ -5,7 +5,8 @@
  *   each step  residuals of the operating point, local flux error, torque
  *     psi^ = psi(i_m) + parameters + local,  t^ = psi^_d i^_mq - psi^_q i^_md, over the period
  *     local  += rate ((w e_q, -w e_d)/(w^2 + w_x^2) - local): the flux of the voltage model, weighted by the speed
- *   each tenth step  Kalman update with the mean residuals, Kalman prediction, confidence
+ *   each tenth step  Kalman update with the mean residuals of the d axis; in the step after it the q axis, before
+ *                    the residuals; one step later Kalman prediction, confidence
  * Source   docs/theory/identification.md (ID-5) ... (ID-21)
  * Units    per unit
  * Range    as in its parts
@@ -14,7 +15,8 @@
  *          variances at each update: damage by the memory is reported until the reset of the processor
  *          without valid windows the parameters only return to their priors; clamped states and innovations beyond the
  *          gate reduce the confidence to 0, the torque estimate continues
- * Context  1 kHz task; five divisions per step, one more per update and axis */
+ * Context  1 kHz task; five divisions per step, one more per update and axis. An update is spread over three steps, so
+ *          that none computes much more than the others */
 #include "control/identify/kalman.h"
 #include "types/temperature.h"
 
@@ -28,7 +30,7 @@ typedef struct {
     q15_t confidence;
     bool torque_certain; /* the confidence rises, else it falls */
     bool update_valid;   /* every step of this update so far was valid */
-    bool clamped;        /* a state reached its limit in the last update */
+    bool clamped;        /* a state reached its limit in the last update; before the q axis's turn, by the d axis */
     bool r_known;        /* the winding temperature is measured */
 } identify_kept_t;
 _Static_assert(sizeof(identify_kept_t) == 20U, "no bytes between the fields");

@@ -9,24 +9,27 @@
 #define GATE_SHIFT 3                 /* e^2 > 8 h P h' + r; r already allows for errors that persist (ID-14) */
 #define DIVISOR_BITS 16
 
-/* 1/s = inverse 2^-(32 + shift), rounded down. */
+/* 1/s = inverse 2^-(32 + shift), rounded down; inverse < 2^17. */
 typedef struct {
-    uint32_t inverse;
+    int32_t inverse;
     unsigned shift;
 } reciprocal_t;
 
-/* x 2^-n, half up, n = 1 ... 31. Not inlined, like dot(): one copy takes less memory. */
-static FX_NOT_INLINED int32_t round_shift(int64_t x, unsigned n)
+/* x 2^-n, half up, n = 1 ... 31, |x| < 2^62. Each word by itself: a shift of both would allow for n > 31. */
+static int32_t round_shift(int64_t x, unsigned n)
 {
-    const uint32_t half = ((uint32_t)x >> (n - 1U)) & 1U;
-    return fx_add_q31(fx_sat_q31(x >> n), (int32_t)half);
+    const int64_t rounded = x + (int32_t)(1U << (n - 1U));
+    const int32_t high = (int32_t)(rounded >> 32);
+    const uint32_t low = (uint32_t)rounded >> n | (uint32_t)high << (32U - n);
+    return fx_sat_q31((int64_t)((uint64_t)(uint32_t)(high >> n) << 32 | low));
 }
 
+/* Not inlined: one copy takes less memory. */
 static FX_NOT_INLINED int64_t dot(const int32_t *a, const int32_t *b)
 {
     int64_t sum = 0;
-    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
-        sum += (int64_t)a[j] * b[j];
+    for (const int32_t *const end = &a[IDENTIFY_STATES]; a != end; a++, b++) {
+        sum += (int64_t)*a * *b;
     }
     return sum;
 }
@@ -43,28 +46,35 @@ void kalman_reset(kalman_t *kalman)
 void kalman_predict(const identify_config_t *config, kalman_t *kalman, bool r_known)
 {
     int32_t *p = kalman->p_q30;
+    int32_t prior = r_known ? config->r_known_q30 : IDENTIFY_ONE_Q30;
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
-        int32_t prior = (j == IDENTIFY_R && r_known) ? config->r_known_q30 : IDENTIFY_ONE_Q30;
-        kalman->x_q27[j] -= fx_mul_q31(config->leak[j], kalman->x_q27[j]);
+        const int32_t twice = 2 * config->leak[j]; /* at most 1/2: identify_check() */
+        kalman->x_q27[j] -= fx_mulhi(twice, kalman->x_q27[j]);
         for (unsigned l = j; l < IDENTIFY_STATES; l++) {
-            *p += fx_mul_q31(config->leak[j] + config->leak[l], fx_sub_q31(prior, *p));
+            *p = fx_mulhi_add(*p, fx_add2_q31(twice, config->leak[l]), fx_sub_q31(prior, *p));
             prior = 0;
             p++;
         }
+        prior = IDENTIFY_ONE_Q30;
     }
 }
 
-/* Computes P h' and returns h P h', Q60. */
+/* Computes P h' and returns h P h', Q60. |P_jl| <= 1 and |h| <= 1/4, hence |P h'| < 2. */
 static int64_t project_covariance(const kalman_t *kalman, const jacobian_row_t *row, int32_t *ph_q30)
 {
+    const int32_t *const end = &row->h_q30[IDENTIFY_STATES];
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
-        int64_t sum = 0;
+        int64_t sum = 1 << 29; /* half a bit of the result */
         const int32_t *p = &kalman->p_q30[j];
-        for (unsigned l = 0; l < IDENTIFY_STATES; l++) {
-            sum += (int64_t)*p * row->h_q30[l];
-            p += (l < j) ? IDENTIFY_STATES - 1U - l : 1U; /* down the column to the diagonal, then along the row */
+        const int32_t *h = row->h_q30;
+        for (unsigned step = IDENTIFY_STATES - 1U; h != &row->h_q30[j]; step--) { /* down the column to the diagonal */
+            sum += (int64_t)*p * *h++;
+            p += step;
         }
-        ph_q30[j] = round_shift(sum, 30);
+        while (h != end) { /* then along the row */
+            sum += (int64_t)*p++ * *h++;
+        }
+        ph_q30[j] = (int32_t)(sum >> 30);
     }
     return dot(ph_q30, row->h_q30);
 }
@@ -92,13 +102,14 @@ static reciprocal_t reciprocal(int64_t s_q60)
     const int64_t limited_q60 = (s_q60 < S_MIN_Q60) ? S_MIN_Q60 : s_q60;
     const unsigned shift = 64U - fx_leading_zeros((uint32_t)(limited_q60 >> 32)) - DIVISOR_BITS;
     const uint32_t mantissa = (uint32_t)(limited_q60 >> shift) + 1U;
-    return (reciprocal_t){UINT32_MAX / mantissa, shift};
+    return (reciprocal_t){(int32_t)(UINT32_MAX / mantissa), shift};
 }
 
-/* x += k e for one state; true if it was clamped. */
+/* x += k e for one state; true if it was clamped. |k e| < 128/16. */
 static bool update_state(int32_t *x_q27, int32_t gain_q24, int32_t innovation_q30)
 {
-    const int32_t updated = fx_add_q31(*x_q27, round_shift((int64_t)gain_q24 * innovation_q30, 27));
+    const int64_t step_q54 = (int64_t)gain_q24 * innovation_q30 + (1 << 26);
+    const int32_t updated = fx_add_q31(*x_q27, (int32_t)(step_q54 >> 27));
     *x_q27 = fx_clamp_q31(updated, -X_MAX_Q27, X_MAX_Q27);
     return *x_q27 != updated;
 }
@@ -107,11 +118,11 @@ static bool update_state(int32_t *x_q27, int32_t gain_q24, int32_t innovation_q3
  * |k_j (P h')_l| <= 1. */
 static int32_t *update_row(int32_t *p, int32_t gain_q24, const int32_t *ph_q30, unsigned n)
 {
-    for (unsigned l = 0; l < n; l++) {
-        const int64_t reduction = (int64_t)gain_q24 * ph_q30[l] + (1 << 23);
-        p[l] -= (int32_t)(reduction >> 24);
+    for (; n != 0U; n--) {
+        const int64_t reduction = (int64_t)gain_q24 * *ph_q30++ + (1 << 23);
+        *p++ -= (int32_t)(reduction >> 24);
     }
-    return &p[n];
+    return p;
 }
 
 /* Measurement update (ID-9). */

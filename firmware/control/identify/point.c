@@ -50,7 +50,7 @@ identify_point_t identify_point(const identify_config_t *config, const identify_
     const identify_end_t *a = &window->first;
     const identify_end_t *b = &window->last;
     const q31_t omega = mean_speed(config, b->theta - a->theta, omega_tracked);
-    const q31_t sinc = fx_mul_q31(config->sinc_gain, fx_mul_q31(omega, omega));
+    const q31_t sinc = fx_mulhi(2 * config->sinc_gain, fx_mul_q31(omega, omega));
     const q31_t iron = iron_admittance(config, omega);
     const dq_q31_t i = {trapezoid(config, window->sum_i.d, a->i.d, b->i.d),
                         trapezoid(config, window->sum_i.q, a->i.q, b->i.q)};

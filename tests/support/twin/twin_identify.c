@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-enum { R, DROP, FLUX, LQ, LD, ANGLE, IRON, STEPS = 10 };
+enum { R, DROP, FLUX, LQ, LD, ANGLE, IRON, STEPS = 10, PREDICTION_STEP = 2 };
 
 static const double x_max = 4.0, e_max_pu = 0.0625, mismatch_max = 0.5;
 
@@ -89,20 +89,37 @@ static void average_step(const motor_si_t *motor, twin_identify_t *s, const twin
     s->steps++;
 }
 
-static void update_parameters(const motor_si_t *motor, twin_identify_t *s)
+/* One axis of the mean measurement, per unit as the limit of e. */
+static bool update(const motor_si_t *motor, twin_identify_t *s, const double mean[TWIN_STATES], double e)
 {
-    const double v = motor->v_base_V; /* the limit of e is per unit */
-    double d[TWIN_STATES], q[TWIN_STATES];
+    double h[TWIN_STATES];
     for (int j = 0; j < TWIN_STATES; j++) {
-        d[j] = s->mean_d[j] / v;
-        q[j] = s->mean_q[j] / v;
+        h[j] = mean[j] / motor->v_base_V;
     }
-    const double r = pow(s->noise / v, 2.0);
-    const double output_before = dot(q, s->kalman.x);
-    const bool mismatch_d = twin_kalman_update(&s->kalman, d, s->e.d / v, r);
-    const double change = dot(q, s->kalman.x) - output_before;
-    const bool mismatch_q = twin_kalman_update(&s->kalman, q, s->e.q / v - change, r);
-    s->mismatch_share += motor->identify_mismatch_rate * ((mismatch_d || mismatch_q) - s->mismatch_share);
+    return twin_kalman_update(&s->kalman, h, e / motor->v_base_V, pow(s->noise / motor->v_base_V, 2.0));
+}
+
+static void update_d_axis(const motor_si_t *motor, twin_identify_t *s)
+{
+    if (s->update_valid) {
+        const double output_before = dot(s->mean_q, s->kalman.x);
+        s->mismatch_d = update(motor, s, s->mean_d, s->e.d);
+        s->e.q -= dot(s->mean_q, s->kalman.x) - output_before;
+    }
+    s->steps = 0;
+}
+
+static void update_q_axis(const motor_si_t *motor, twin_identify_t *s)
+{
+    if (s->update_valid) {
+        const bool mismatch_q = update(motor, s, s->mean_q, s->e.q);
+        s->mismatch_share += motor->identify_mismatch_rate * ((s->mismatch_d || mismatch_q) - s->mismatch_share);
+    }
+    for (int j = 0; j < TWIN_STATES; j++) {
+        s->mean_d[j] = s->mean_q[j] = 0.0;
+    }
+    s->e = (twin_dq_t){0.0, 0.0};
+    s->noise = 0.0;
 }
 
 static void update_confidence(const motor_si_t *motor, twin_identify_t *s, const twin_model_t *m)
@@ -153,6 +170,9 @@ static void estimate_torque(const motor_si_t *motor, twin_identify_t *s, const t
 void twin_identify(const motor_si_t *motor, twin_identify_t *s, const twin_point_t *point, double winding_C,
                    bool enabled)
 {
+    if (s->steps == 0) {
+        update_q_axis(motor, s);
+    }
     s->r_known = !isnan(winding_C);
     if (s->r_known) {
         s->r_prior = motor->r_ohm_20 * (1.0 + motor->r_temp_coeff_per_K * (winding_C - 20.0));
@@ -162,18 +182,10 @@ void twin_identify(const motor_si_t *motor, twin_identify_t *s, const twin_point
     update_local_flux_error(motor, s, point, e, point->valid && enabled);
     average_step(motor, s, point, &m, e, enabled);
     estimate_torque(motor, s, point, &m);
-    if (s->steps < STEPS) {
-        return;
+    if (s->steps == PREDICTION_STEP) {
+        twin_kalman_predict(motor, &s->kalman, s->r_known);
+        update_confidence(motor, s, &m);
+    } else if (s->steps == STEPS) {
+        update_d_axis(motor, s);
     }
-    if (s->update_valid) {
-        update_parameters(motor, s);
-    }
-    twin_kalman_predict(motor, &s->kalman, s->r_known);
-    update_confidence(motor, s, &m);
-    for (int j = 0; j < TWIN_STATES; j++) {
-        s->mean_d[j] = s->mean_q[j] = 0.0;
-    }
-    s->e = (twin_dq_t){0.0, 0.0};
-    s->noise = 0.0;
-    s->steps = 0;
 }

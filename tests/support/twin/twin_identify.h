@@ -58,7 +58,7 @@ typedef struct {
     double r_prior, mismatch_share, confidence;
     double torque, psi_delta; /* N m, Vs */
     int steps;
-    bool update_valid, r_known, torque_certain;
+    bool update_valid, mismatch_d, r_known, torque_certain;
 } twin_identify_t;
 
 void twin_identify_reset(const motor_si_t *motor, twin_identify_t *state);

@@ -27,7 +27,7 @@ static can_frame_t frame;
 void setUp(void)
 {
     tx = (can_tx_t){0};
-    telemetry = (telemetry_t){.scales = &scales};
+    telemetry = (telemetry_t){.scales = &scales, .motor_name = "hsm1"};
 }
 
 void tearDown(void)

@@ -113,3 +113,22 @@ void test_any_other_length_is_refused_before_the_data_are_checked(void)
     }
     TEST_ASSERT_FALSE(state.synced);
 }
+
+/* The division by x^8 + x^4 + x^3 + x^2 + 1, bit by bit. */
+static uint8_t remainder_of_byte(uint8_t byte)
+{
+    unsigned rest = byte;
+    for (int bit = 0; bit < 8; bit++) {
+        rest = ((rest & 0x80U) != 0U) ? (rest << 1 ^ 0x1DU) & 0xFFU : rest << 1;
+    }
+    return (uint8_t)rest;
+}
+
+/* Only the last byte of the frame is not zero, so that the CRC is the remainder of this byte. */
+void test_the_remainder_of_each_byte_is_that_of_the_polynomial(void)
+{
+    for (unsigned byte = 0; byte < 256; byte++) {
+        const can_frame_t frame = {.length = 8, .data = {[7] = (uint8_t)byte}};
+        TEST_ASSERT_EQUAL_HEX8(remainder_of_byte((uint8_t)byte), e2e_crc(0, &frame));
+    }
+}

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include <math.h>
+#include <string.h>
 
 #include "identify_fixture.h"
 #include "unity.h"
@@ -186,6 +187,21 @@ void test_an_update_needs_ten_valid_steps(void)
     TEST_ASSERT_EQUAL_INT32(0, state.kalman.x_q27[IDENTIFY_FLUX]);
 }
 
+/* The d axis in the tenth step, the q axis in the next one, the time update in the one after that, and nothing in any
+ * other step; with a valid seal after each. */
+void test_an_update_is_spread_over_three_steps(void)
+{
+    for (int n = 1; n <= 40; n++) {
+        const kalman_t before = state.kalman;
+        run((dq_q15_t){-4000, 8000}, 0.4, deviating, 1);
+        const int step = n % 10;
+        const bool is_due = n >= 10 && (step == 0 || step == 1 || step == 2);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(is_due, memcmp(&before, &state.kalman, sizeof before) != 0, "step");
+        identify_check_parameters(&state);
+        TEST_ASSERT_FALSE(state.damaged);
+    }
+}
+
 /* 0.39 % per kelvin: 39 % more at 120 C. */
 void test_the_winding_temperature_sets_the_prior_resistance_and_a_lost_sensor_keeps_it(void)
 {
@@ -353,7 +369,7 @@ void test_the_count_of_updates_beyond_the_gate_is_cleared_by_a_good_update_and_w
 void test_a_parameter_at_its_limit_removes_the_confidence(void)
 {
     c.noise_voltage_q30 = (int32_t)(0.2 * 1073741824.0);
-    run((dq_q15_t){-4000, 8000}, 0.5, (truth_t){-0.42, 1.0, 0.0}, 20000);
+    run((dq_q15_t){-4000, 8000}, 0.5, (truth_t){-0.42, 1.0, 0.0}, 20001); /* the q axis is applied in the next step */
     TEST_ASSERT_TRUE(state.kept.clamped);
     TEST_ASSERT_GREATER_THAN_INT(16384, state.kept.mismatch_share);
     TEST_ASSERT_FALSE(state.kept.torque_certain);

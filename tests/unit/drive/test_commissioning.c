@@ -23,7 +23,7 @@ void setUp(void)
     seam_start();
     snapshot = (snapshot_t){.sample = {.acting = true, .v_dc = V_DC}, .window = {.acting = true}};
     drive.task.run_state = RUN_STATE_RUN;
-    drive.task.identify.kalman.x_q27[IDENTIFY_DROP] = 1000000;
+    identify_set(&drive.task.identify, IDENTIFY_DROP, 1000000);
 }
 
 void tearDown(void)

@@ -848,3 +848,15 @@ void test_outside_ready_and_run_nothing_stays_enabled(void)
     to_safe();
     TEST_ASSERT_FALSE(s.enabled);
 }
+
+/* A row outside the rows of its state would never be taken. */
+void test_the_rows_of_each_state_are_those_that_begin_in_it(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, supervisor_first[0]);
+    for (int state = 0; state < STATES; state++) {
+        TEST_ASSERT_TRUE(supervisor_first[state] < supervisor_first[state + 1]);
+        for (int row = supervisor_first[state]; row < supervisor_first[state + 1]; row++) {
+            TEST_ASSERT_EQUAL_INT(state, supervisor_table[row].from);
+        }
+    }
+}

@@ -29,7 +29,8 @@ static const telemetry_t *read_back(void)
     *sample_box_begin(&drive.samples) = sample;
     sample_box_publish(&drive.samples);
     telemetry = (telemetry_t){0};
-    telemetry_read(&drive, &telemetry);
+    const can_tx_t tx = {.pending = UINT16_MAX}; /* each message */
+    telemetry_read(&drive, &tx, &telemetry);
     return &telemetry;
 }
 
@@ -131,8 +132,7 @@ void test_a_temperature_without_a_sensor_is_reported_as_invalid(void)
     TEST_ASSERT_EQUAL_FLOAT(0.0F, t->inverter_C);
 }
 
-/* The motor id is FNV-1a of "hsm1" with 32 bits, computed outside this project. */
-void test_faults_overruns_and_the_motor_id_are_reported(void)
+void test_faults_overruns_and_the_name_of_the_motor_are_reported(void)
 {
     drive.fast.faults = 0x1004;
     drive.fast.motor_check = MOTOR_CHECK_TORQUE_MAX;
@@ -141,5 +141,15 @@ void test_faults_overruns_and_the_motor_id_are_reported(void)
     TEST_ASSERT_EQUAL_HEX32(0x1004, t->drive_faults);
     TEST_ASSERT_EQUAL_UINT32(MOTOR_CHECK_TORQUE_MAX, t->motor_check);
     TEST_ASSERT_EQUAL_UINT32(9, t->diagnostics.isr_overruns);
-    TEST_ASSERT_EQUAL_HEX32(0x6CAE75C6, t->motor_id);
+    TEST_ASSERT_EQUAL_STRING("hsm1", t->motor_name);
+}
+
+/* The values that no pending message contains stay as they were. */
+void test_identification_and_temperatures_are_read_only_for_their_messages(void)
+{
+    const can_tx_t none = {0};
+    telemetry = (telemetry_t){.psi_f_mVs = -1.0F, .winding_C = -1.0F};
+    telemetry_read(&drive, &none, &telemetry);
+    TEST_ASSERT_EQUAL_FLOAT(-1.0F, telemetry.psi_f_mVs);
+    TEST_ASSERT_EQUAL_FLOAT(-1.0F, telemetry.winding_C);
 }
