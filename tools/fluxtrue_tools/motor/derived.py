@@ -159,6 +159,7 @@ class Derived:
     phase_alive_A: float
     ripple_A: float
     answer_rate: float
+    behind_A_per_V: float
     speed_trip_rad_s: float
     monitor_torque_Nm: float
     monitor_V: float
@@ -252,6 +253,13 @@ def missing_periods(config: MotorConfig) -> float:
 def _answer_rate(config: MotorConfig, bases: Bases) -> float:
     """Share of a change of the reference that the current follows in a step (CC-21); all with the usual law."""
     return 1.0 - (1.0 - TURNING_APPROACH) ** bases.periods_per_step if config.is_turning else 1.0
+
+
+def _behind_A_per_V(config: MotorConfig, model: FluxModel, bases: Bases) -> float:
+    """How far the current is off its reference if the rotational voltage is wrong by 1 V (MN-43)."""
+    l_min = min(float(model.psi_d(0.0, 0.0, nd=1)), float(model.psi_q(0.0, 0.0, nq=1)))
+    sigma = _current_control(bases.period_s)["sigma_rad_s"]
+    return 1.0 / (l_min * (TURNING_FEEDBACK / bases.period_s if config.is_turning else sigma))
 
 
 def frozen_settle_s(config: MotorConfig) -> float:
@@ -362,6 +370,7 @@ def _slow_monitors(config: MotorConfig, model: FluxModel, bases: Bases) -> dict[
         "phase_dead_A": PHASE_DEAD_SHARE * machine.i_max_A,
         # The fastest change of torque moves the current by this much per second; current control lags behind (TL-11).
         "answer_rate": _answer_rate(config, bases),
+        "behind_A_per_V": _behind_A_per_V(config, model, bases),
         "ripple_A": (RIPPLE_SHARE + SLEW_WEAK_PER_TORQUE_MAX * LOOP_MISSING_PERIODS * bases.period_s) * machine.i_max_A,
         "phase_alive_A": PHASE_ALIVE_SHARE * machine.i_max_A,
         "speed_trip_rad_s": (1.0 + SPEED_TRIP * reserve) * omega,

@@ -466,6 +466,11 @@ def _plausibility(motor: Motor) -> list[Row]:
         ("ripple_max", q15(d.ripple_A / b.current_A, "ripple_max"), f"{d.ripple_A:.4g} A"),
         ("zero_error_max", q15(ZERO_ERROR_SHARE, "zero_error_max"), "of the converter's full scale"),
         ("answer_rate", q15(min(d.answer_rate, 1 - 1 / Q15_ONE), "answer_rate"), f"{d.answer_rate:.4g} per step"),
+        (
+            "behind_gain",
+            q16(d.behind_A_per_V * b.voltage_V / b.current_A, "behind_gain"),
+            f"{d.behind_A_per_V:.4g} A/V",
+        ),
         ("omega_trip", q15(d.speed_trip_rad_s / b.omega_rad_s, "omega_trip"), f"{d.speed_trip_rad_s:.6g} rad/s"),
         ("inverter_trip_dC", str(round(10 * thermal.inverter_trip_C)), ""),
         ("winding_trip_dC", str(round(10 * thermal.winding_trip_C)), ""),
