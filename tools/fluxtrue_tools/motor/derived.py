@@ -31,6 +31,7 @@ ANGLE_JUMPS_S = 0.03  # of implausible samples: (MN-21)
 REPEAT_TURNS = 2 / 4096  # mechanical: two counts of the coarsest sensor, (AT-16)
 LAG_SHARE = 0.1875  # of the lag that a rotor which stops leaves behind the prediction: (AT-17)
 STOP_S = 0.005  # in which a slow rotor can stop: (AT-18)
+BASE_STOPS_S = 0.25  # from the speed base to standstill: (SS-5)
 ANGLE_HARMONIC_MAX_TURNS = 2 / 360  # electrical, of each harmonic's cosine and sine: a good sensor stays below half
 
 KNEE_LSB = 4
@@ -99,6 +100,7 @@ class Derived:
     psi_f_Vs: float
     tracker_bandwidth_rad_s: float
     tracker_jump_turns: float
+    stop_speed_rad_s: float
     sigma_rad_s: float
     setpoint_weight: float
     integral_ratio: float
@@ -414,12 +416,24 @@ def _tracker(config: MotorConfig) -> dict[str, float]:
     }
 
 
+def _stop_speed_rad_s(config: MotorConfig, bases: Bases, bandwidth_rad_s: float) -> float:
+    """Tracked speed up to which a rotor may be at rest after STOP_S with the same angle (AT-18), (AT-21)."""
+    deceleration = bases.omega_rad_s / BASE_STOPS_S
+    tracked_rad_s = 2.0 * deceleration / bandwidth_rad_s  # when the rotor has stopped
+    count_rad = 2.0 * math.pi * config.machine.pole_pairs / 4096
+    seen_rad = deceleration / bandwidth_rad_s**2 - count_rad  # of the lag, in the worst case
+    hidden = seen_rad < LAG_SHARE * tracked_rad_s / bandwidth_rad_s
+    return 2.0 * tracked_rad_s if hidden else deceleration * STOP_S
+
+
 def derive(config: MotorConfig, model: FluxModel, bases: Bases) -> Derived:
     """All derived numbers of one motor."""
     psi_f = float(model.psi_d(0.0, 0.0))
+    tracker = _tracker(config)
     return Derived(
         psi_f_Vs=psi_f,
-        **_tracker(config),
+        **tracker,
+        stop_speed_rad_s=_stop_speed_rad_s(config, bases, tracker["tracker_bandwidth_rad_s"]),
         **_current_control(bases.period_s),
         **_modulation(config),
         **_identification(config, model, bases, psi_f),

@@ -157,6 +157,11 @@ def _tracker(motor: Motor) -> list[Row]:
             f"{REPEAT_TURNS:g} turn mechanical",
         ),
         ("lag_steps", f"{round(LAG_SHARE / w_ts)}u", f"{LAG_SHARE:g}/(w_n T_s)"),
+        (
+            "stop_speed_q30",
+            q31(d.stop_speed_rad_s / b.omega_rad_s / 2.0, "stop_speed"),
+            f"{d.stop_speed_rad_s:.4g} rad/s",
+        ),
         ("stop_periods", f"{round(STOP_S / b.period_s)}u", f"{1e3 * STOP_S:g} ms of periods"),
         ("turn_shift", f"{shift}u", ""),
     ]
