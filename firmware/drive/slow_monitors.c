@@ -64,6 +64,7 @@ static uint32_t check_torque(drive_t *drive, const snapshot_t *snapshot)
     const torque_monitor_in_t in = {
         .acting = sample->acting && !drive_bypasses_torque_path(drive),
         .u = sample->point.u,
+        .u_mean = step_mean_voltage(drive, snapshot),
         .i = sample->point.i,
         .psi = {sample->point.flux.psi_d, sample->point.flux.psi_q},
         .omega = fx_q15_from_q31(sample->point.omega),
