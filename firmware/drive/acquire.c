@@ -31,7 +31,7 @@ static FX_NOT_INLINED void check_angle(drive_t *drive, sample_t *sample, int32_t
     if (repeated) {
         meaning = angle_tracker_repeated(&drive->period.angle_tracker, tracker, &angle, drive->samples.generation);
     }
-    if (meaning == ANGLE_STUCK ? !angle_tracker_may_stop(tracker) : angle.jumped) {
+    if (meaning == ANGLE_STUCK ? !angle_tracker_may_stop(&drive->period.angle_tracker, tracker) : angle.jumped) {
         monitor_report_angle_jump(&drive->fast.monitor);
     }
     if (meaning == ANGLE_STUCK || angle.jumped) {

@@ -3,6 +3,7 @@
 
 #include "control/current/transform.h"
 #include "drive/step_mean.h"
+#include "fx/vec.h"
 
 static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
 {
@@ -23,6 +24,13 @@ static bool is_at_rest(const snapshot_t *snapshot)
     return !snapshot->sample.acting && !snapshot->gates && drive_stands_still(snapshot->sample.point.omega);
 }
 
+/* The rotational voltage that the tracked speed does not contain while it is behind the rotor's. */
+static q15_t missing_voltage(const drive_t *drive, q15_t lag)
+{
+    const dq_q15_t psi = drive->task.psi_ref;
+    return (lag == 0) ? 0 : fx_mul_q15(fx_abs_q15(lag), fx_magnitude(psi.d, psi.q));
+}
+
 static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
 {
     const sample_t *sample = &snapshot->sample;
@@ -37,6 +45,7 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q
         .i = sample->point.i,
         .i_ref = task->i_ref,
         .i_mean = step_mean_current(drive, snapshot),
+        .u_behind = missing_voltage(drive, snapshot->lag),
         .phases = measure_phases(sample->i_ab, sample->zero_q28),
         .phases_ref = at_once ? phases_ref : in_phases(expected, sample->theta_e),
         .omega = fx_q15_from_q31(sample->point.omega),
@@ -55,6 +64,7 @@ static uint32_t check_torque(drive_t *drive, const snapshot_t *snapshot)
     const torque_monitor_in_t in = {
         .acting = sample->acting && !drive_bypasses_torque_path(drive),
         .u = sample->point.u,
+        .u_mean = step_mean_voltage(drive, snapshot),
         .i = sample->point.i,
         .psi = {sample->point.flux.psi_d, sample->point.flux.psi_q},
         .omega = fx_q15_from_q31(sample->point.omega),

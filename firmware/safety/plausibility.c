@@ -43,7 +43,8 @@ static uint32_t lost_phases(const plausibility_config_t *config, plausibility_st
                             const plausibility_in_t *in)
 {
     const q15_t current = fx_magnitude(state->expected.d, state->expected.q);
-    const int32_t alive = fx_max_s32(config->i_alive, current >> 3);
+    const int32_t behind = fx_mul_gain_q15(config->behind_gain, in->u_behind); /* (MN-43) */
+    const int32_t alive = fx_max_s32(config->i_alive, current >> 3) + behind;
     const bool a_lost = is_phase_lost(config, state->lost[0], alive, in->phases_ref.a, in->phases.a);
     const bool b_lost = is_phase_lost(config, state->lost[1], alive, in->phases_ref.b, in->phases.b);
     const bool c_lost = is_phase_lost(config, state->lost[2], alive, in->phases_ref.c, in->phases.c);

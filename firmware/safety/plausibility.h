@@ -5,8 +5,8 @@
  *   control deviation  |i - i*| > e_0 + |i*|/8 for 20 ms, for 100 ms while the voltage is limited
  *   oscillation        mean of |i - i* - mean(i - i*)| over 16 ms above ripple_max for 20 ms; i is the sample or the
  *                      mean of a step, whichever is further off; each deviation limited to 4 ripple_max
- *   phase lost         i_x <= i_dead in the direction of i_x*, |i_x*| > max(i_alive, |i*|/8): 8 more such samples than
- *                      samples with current, each direction counted by itself
+ *   phase lost         i_x <= i_dead in the direction of i_x*, |i_x*| > max(i_alive, |i*|/8) + behind_gain u_behind: 8
+ *                      more such samples than samples with current, each direction counted by itself
  *   sensor stuck       20 equal samples of a phase while the sum of the others changes by more than i_dead/4 in each
  *   mismatch           the d-axis voltage contradicts the currents, the speed and the identified machine for 70 ms
  *   over-speed         |w| > w_trip for 5 ms
@@ -15,7 +15,7 @@
  *                      below it
  *   reference          a known voltage is read more than 6 % wrong in 10 steps
  *   These times are counted in steps of the task, rounded up.
- * Source   docs/theory/monitors.md (MN-1) ... (MN-5), (MN-11), (MN-12), (MN-37), (MN-38)
+ * Source   docs/theory/monitors.md (MN-1) ... (MN-5), (MN-11), (MN-12), (MN-37), (MN-38), (MN-43)
  * Units    per unit; temperatures in tenths of a degree C, or TEMPERATURE_UNKNOWN
  * Range    every argument
  * Errors   returns the set of faults that are confirmed now; the fast ISR latches them
@@ -32,6 +32,7 @@ typedef struct {
     q15_t ripple_max;
     q15_t zero_error_max; /* of a phase current that cannot flow */
     q15_t answer_rate;    /* share of a change of the reference that the current follows in a step; Q15_MAX: all */
+    q16_t behind_gain;    /* current per rotational voltage that is missing */
     q15_t omega_trip;
     int16_t inverter_trip_dC, winding_trip_dC;
     int16_t deviation_steps;     /* 100 ms: a step counts once while the voltage is limited, else five times */
@@ -58,6 +59,7 @@ typedef struct {
     dq_q15_t i, i_ref;    /* measured, and the reference in effect until now */
     dq_q15_t i_mean;      /* of the last step; the sample if there is none */
     abc_q15_t phases;     /* measured */
+    q15_t u_behind;       /* rotational voltage that is missing because the tracked speed is behind the rotor's */
     abc_q15_t phases_ref; /* plausibility_expected() as phase currents at the instant of the samples */
     q15_t omega;
     int16_t inverter_dC, winding_dC;

@@ -106,11 +106,11 @@ static bool is_torque_excessive(const torque_monitor_config_t *config, torque_mo
 
 /* The back-EMF does not fit the angle (MN-9), (MN-10). */
 static bool is_angle_implausible(const torque_monitor_config_t *config, const torque_monitor_in_t *in,
-                                 const machine_t *now, dq_q15_t emf, dq_q15_t rate)
+                                 const machine_t *now, dq_q15_t emf, dq_q15_t rate, dq_q15_t psi)
 {
     const q15_t speed_abs = fx_abs_q15(now->speed.omega);
-    const int32_t e_d = emf.d + fx_mul_q15(now->speed.omega, in->psi.q);
-    const int32_t e_q = emf.q - fx_mul_q15(now->speed.omega, in->psi.d);
+    const int32_t e_d = emf.d + fx_mul_q15(now->speed.omega, psi.q);
+    const int32_t e_q = emf.q - fx_mul_q15(now->speed.omega, psi.d);
     const int32_t e_magnet = (now->speed.omega < 0) ? -e_q : e_q;
     const int32_t emf_nominal = fx_mul_q15(speed_abs, config->psi_f);
     const int32_t d_share = fx_mul_q15(PSI_D_AXIS, emf_nominal);
@@ -141,13 +141,15 @@ uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monit
     }
     const dq_q15_t rate = flux_rate(config, state, in->psi);
     const machine_t now = {follow_speed(config, state, in->omega), resistance(config, in->winding_dC)};
+    const dq_q15_t psi_mean = {(in->psi.d + state->psi.d) / 2, (in->psi.q + state->psi.q) / 2};
     state->psi = in->psi;
     state->omega = in->omega;
     const q15_t drop_d = fx_mul_gain_q15(now.r.r, (q15_t)in->i.d);
     const q15_t drop_q = fx_mul_gain_q15(now.r.r, (q15_t)in->i.q);
     const dq_q15_t emf = {fx_sat_q15(in->u.d - drop_d - rate.d), fx_sat_q15(in->u.q - drop_q - rate.q)};
     const bool torque_bad = is_torque_excessive(config, state, in, &now, emf, rate);
-    const bool angle_bad = is_angle_implausible(config, in, &now, emf, rate);
+    const dq_q15_t emf_mean = {fx_sat_q15(in->u_mean.d - drop_d - rate.d), fx_sat_q15(in->u_mean.q - drop_q - rate.q)};
+    const bool angle_bad = is_angle_implausible(config, in, &now, emf_mean, rate, psi_mean);
     return debounce_step(&state->torque, torque_bad, config->torque_steps, FAULT_TORQUE) |
            debounce_step(&state->angle, angle_bad, config->angle_steps, FAULT_ANGLE_OFFSET);
 }

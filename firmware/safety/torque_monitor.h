@@ -14,7 +14,7 @@
  *   r     at the winding's temperature; without one, of the middle of its range; r_error, an eighth of it and half of
  *         that range, allows r_error |i| more
  *   confirmed by 20 ms in a row for the torque, 5 ms for the angle
- * Source   docs/theory/monitors.md (MN-6) ... (MN-10), (MN-26), (MN-32), (MN-41)
+ * Source   docs/theory/monitors.md (MN-6) ... (MN-10), (MN-26), (MN-32), (MN-41), (MN-44)
  * Units    per unit
  * Range    every argument; saturates
  * Rounding 1 LSB q15, against thresholds of hundreds
@@ -53,6 +53,7 @@ typedef struct {
 typedef struct {
     bool acting;
     dq_q15_t u, i, psi; /* acting voltage, current and the tables' flux there */
+    dq_q15_t u_mean;    /* acting voltage, mean of the last step; u if there is none */
     q15_t omega;        /* tracked: lags behind the rotor */
     q15_t torque;       /* commanded, as the closed loop follows it */
     int16_t winding_dC; /* or one of types/temperature.h */

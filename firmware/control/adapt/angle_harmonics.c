@@ -9,15 +9,17 @@
 #define PARTS_PER_STEP 4        /* the whole table in 16 steps */
 #define ADVANCE_MIN (1 << 26)   /* 1/64 turn per step: below, the second difference of a harmonic is too small */
 #define ADVANCE_MAX (1 << 30)   /* 1/4 turn per step: above, the second harmonic aliases */
+#define ADVANCE_FAST_SHIFT 28   /* between 1/16 and 1/8 turn per step mu = 1/16, and mu d below 2^26 */
 #define DIFFERENCE_MAX_SHIFT 4  /* 1/16 of the step: a sample one period late deviates by 1/10 of ten periods */
 
-/* cos theta, sin theta, cos 2 theta, sin 2 theta. */
+/* cos theta, sin theta, cos 2 theta, sin 2 theta. The low half of the sine still contains the cosine, less than an LSB
+ * of it: to clear it would cost a constant. */
 static FX_NOT_INLINED void harmonics(uint32_t theta, int32_t q31[ANGLE_HARMONICS])
 {
     for (unsigned n = 0; n < ANGLE_HARMONICS; n += 2U) {
         const fx_pair_t at = fx_unit_vector(theta);
         q31[n] = (int32_t)(at << 16);
-        q31[n + 1U] = (int32_t)(at >> 16 << 16);
+        q31[n + 1U] = (int32_t)at;
         theta *= 2U;
     }
 }
@@ -31,6 +33,14 @@ static void update_coefficients(const angle_harmonics_config_t *config, angle_ha
         const int32_t updated = state->c[n] + ((fx_mulhi(d, at_q31[n]) + 16) >> 5);
         state->c[n] = fx_clamp_q31(updated, -config->max, config->max);
     }
+}
+
+/* (AT-20): the second difference without its mean over 16 steps, which is the rotor's acceleration. */
+static int32_t without_acceleration(angle_harmonics_state_t *state, int32_t d)
+{
+    const int32_t rest = d - state->acceleration_q21 * (1 << 11);
+    state->acceleration_q21 = (int16_t)(state->acceleration_q21 + (rest >> 15));
+    return rest;
 }
 
 static int32_t correction(const angle_harmonics_state_t *state, uint32_t part)
@@ -60,13 +70,16 @@ void angle_harmonics_step(const angle_harmonics_config_t *config, angle_harmonic
         state->damaged = true;
     }
     if (speed >= ADVANCE_MIN && speed <= ADVANCE_MAX && fx_abs_q31(d) <= speed >> DIFFERENCE_MAX_SHIFT) {
-        update_coefficients(config, state, d);
+        const int32_t of_sensor = without_acceleration(state, d);
+        update_coefficients(config, state, ((speed >> ADVANCE_FAST_SHIFT) == 1) ? 4 * of_sensor : of_sensor);
         state->seal_complement = seal_complement(state);
     }
     state->before = state->last;
     state->last = theta;
+    uint32_t part = state->part;
     for (uint32_t n = 0; n < PARTS_PER_STEP; n++) {
-        table[state->part] = correction(state, state->part);
-        state->part = (uint8_t)((state->part + 1U) % ANGLE_HARMONICS_PARTS);
+        table[part] = correction(state, part);
+        part = (part + 1U) % ANGLE_HARMONICS_PARTS;
     }
+    state->part = (uint8_t)part;
 }

@@ -5,7 +5,6 @@
 #include "fx/q.h"
 
 #define COAST_ROUNDS 10
-#define STOP_SPEED ((1 << 30) / 50) /* Q30, 0.02 of the speed base: 5 ms with the deceleration of safety/safe_state.c */
 
 /* Advance per period. It wraps beyond half a turn, as the angle does. */
 static FX_NOT_INLINED FX_COLD int32_t advance_at(const angle_tracker_config_t *config, int32_t omega_q30)
@@ -129,7 +128,7 @@ FX_COLD angle_repeat_t angle_tracker_repeated(const angle_tracker_config_t *conf
     if (state->cause != REPEATS_OF_SENSOR) {
         return ANGLE_FOLLOWED;
     }
-    if (state->repeats <= config->stop_periods || !angle_tracker_may_stop(state)) {
+    if (state->repeats <= config->stop_periods || !angle_tracker_may_stop(config, state)) {
         return ANGLE_STUCK;
     }
     state->cause = REPEATS_OF_ROTOR; /* (AT-18) */
@@ -145,7 +144,8 @@ FX_COLD bool angle_tracker_may_stick(const angle_tracker_config_t *config, const
     return step * config->stop_periods > config->repeat_max;
 }
 
-FX_NOT_INLINED FX_COLD bool angle_tracker_may_stop(const angle_tracker_state_t *state)
+FX_NOT_INLINED FX_COLD bool angle_tracker_may_stop(const angle_tracker_config_t *config,
+                                                   const angle_tracker_state_t *state)
 {
-    return fx_abs_q31(state->omega_q30) <= STOP_SPEED;
+    return fx_abs_q31(state->omega_q30) <= config->stop_speed_q30;
 }

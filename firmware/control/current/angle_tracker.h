@@ -22,14 +22,15 @@ typedef struct {
     uint32_t pole_pairs;
     uint32_t offset; /* electrical, 2^32 = one turn */
     q31_t kp;
-    int32_t ki_q29;        /* k_i 2 pi/(omega_b T_s): turns per period to per unit */
-    int32_t pu_to_turn;    /* omega_b T_s/(2 pi) 2^34: speed in Q30 to advance per period */
-    uint32_t max_step;     /* largest plausible |e|, 2^32 = one turn */
-    q16_t turn_to_pu;      /* pi/(omega_b T_s), the inverse of pu_to_turn: used for the first two samples only */
-    uint32_t repeat_max;   /* electrical advance during which a turning rotor's angle may repeat, 2^32 = one turn */
-    uint32_t lag_steps;    /* lag behind the prediction, in steps, that precedes a standstill */
-    uint16_t stop_periods; /* 5 ms: in which a rotor of up to STOP_SPEED can stop */
-    uint16_t turn_shift;   /* pu_to_turn is 2^turn_shift smaller; not 0: only angle_tracker_step() may be used */
+    int32_t ki_q29;         /* k_i 2 pi/(omega_b T_s): turns per period to per unit */
+    int32_t pu_to_turn;     /* omega_b T_s/(2 pi) 2^34: speed in Q30 to advance per period */
+    uint32_t max_step;      /* largest plausible |e|, 2^32 = one turn */
+    q16_t turn_to_pu;       /* pi/(omega_b T_s), the inverse of pu_to_turn: used for the first two samples only */
+    uint32_t repeat_max;    /* electrical advance during which a turning rotor's angle may repeat, 2^32 = one turn */
+    uint32_t lag_steps;     /* lag behind the prediction, in steps, that precedes a standstill */
+    int32_t stop_speed_q30; /* tracked speed up to which a rotor may be at rest after stop_periods (AT-18) */
+    uint16_t stop_periods;  /* 5 ms: in which a rotor of up to stop_speed can stop */
+    uint16_t turn_shift;    /* pu_to_turn is 2^turn_shift smaller; not 0: only angle_tracker_step() may be used */
 } angle_tracker_config_t;
 
 /** What repeated readings of an angle show: not decided yet, a failed sensor, or a rotor at standstill. */
@@ -84,6 +85,6 @@ angle_repeat_t angle_tracker_repeated(const angle_tracker_config_t *config, angl
 bool angle_tracker_may_stick(const angle_tracker_config_t *config, const angle_tracker_state_t *state);
 
 /** Whether a rotor at the tracked speed may be at rest within stop_periods. */
-bool angle_tracker_may_stop(const angle_tracker_state_t *state);
+bool angle_tracker_may_stop(const angle_tracker_config_t *config, const angle_tracker_state_t *state);
 
 #endif

@@ -34,6 +34,7 @@ PERIOD = {
     "monitor.angle_count_max", "mrai.period", "mrai.sinc_gain", "mrai.r_delta_max",
     "identify.sinc_gain", "identify.sigma", "parameters.torque_loop.model_rate",
     "plausibility.ripple_max",
+    "plausibility.behind_gain",  # of the gain of current control: (MN-43)
     "angle_tracker.lag_steps", "angle_tracker.stop_periods",
     "torque_monitor.lag_gain",  # half a period of it: (AT-7)
     "torque_monitor.v_noise",  # of the gain of current control: (MN-36)
@@ -112,6 +113,7 @@ COUNTS = {
     "PARTS_PER_STEP": "steps, as docs/theory/angle-tracker.md says",
     "ADVANCE_MIN": "angle of a step, as that page says",
     "ADVANCE_MAX": "angle of a step, as that page says",
+    "ADVANCE_FAST_SHIFT": "angle of a step, as that page says",
     "DIFFERENCE_MAX_SHIFT": "share of that angle",
     "PERIODS_TO_ACT": "delay from duty to voltage",
     "FRAMES_PER_TASK": "frames, more than a bus carries in the longest step",

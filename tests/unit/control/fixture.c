@@ -157,6 +157,7 @@ static void inputs(fixture_t *f)
         .max_step = 1u << 29,
         .repeat_max = POLE_PAIRS * (1u << 21),
         .lag_steps = 4,
+        .stop_speed_q30 = (1 << 30) / 50,
         .stop_periods = 50,
     };
     f->si.pole_pairs = POLE_PAIRS;

@@ -84,15 +84,16 @@ void test_below_940_rpm_the_coefficients_are_kept(void)
     TEST_ASSERT_TRUE(drive(500.0, 0.0, 200) < 0.05);
 }
 
-/* Every seventh sample is taken one period late, which is a tenth of the step. */
+/* Every seventh sample is taken one period late, which is a tenth of the step: used, a single one would change a
+ * coefficient by up to 7e5 LSB. What remains is the resolution of the mean second difference, 2048 LSB. */
 void test_late_samples_are_not_used_for_adaptation(void)
 {
     for (int k = 0; k < 4000; k++) {
         theta += 6000.0 / 60e3;
         angle_harmonics_step(&config, &state, counts(theta + ((k % 7 == 0) ? 600.0 / 60e3 : 0.0)), table);
     }
-    TEST_ASSERT_INT32_WITHIN(64, 0, state.c[0]);
-    TEST_ASSERT_INT32_WITHIN(64, 0, state.c[3]);
+    TEST_ASSERT_INT32_WITHIN(256, 0, state.c[0]);
+    TEST_ASSERT_INT32_WITHIN(256, 0, state.c[3]);
 }
 
 void test_the_coefficients_stay_within_their_limit(void)
@@ -104,11 +105,54 @@ void test_the_coefficients_stay_within_their_limit(void)
     TEST_ASSERT_EQUAL_INT32(config.max, state.c[0]);
 }
 
-/* Uncorrected samples through (AT-11) and (AT-12) in double precision. The fixed point rounds each step by up to 1/2
- * LSB and sine and cosine to 2^-15: 100 steps of up to 1.3e5 LSB of d/64 have an error of 4 LSB each. */
+/* Largest deviation of a coefficient from the sensor's error, in degrees. */
+static double deviation(void)
+{
+    const double right[4] = {-0.3 * cos(1.0), -0.3 * sin(1.0), -0.25 * sin(0.4), -0.25 * cos(0.4)};
+    double worst = 0.0;
+    for (int n = 0; n < 4; n++) {
+        worst = fmax(worst, fabs(state.c[n] / degree - right[n]));
+    }
+    return worst;
+}
+
+/* 0.17 degrees; with mu = 1/64 at every speed 0.32 degrees would be left. */
+void test_a_rotor_that_speeds_up_fast_is_corrected_before_it_is_fast(void)
+{
+    (void)drive(2000.0, 40000.0, 113);
+    TEST_ASSERT_TRUE(drive(6520.0, 0.0, 100) < 0.25);
+}
+
+/* 0.021 degrees; without (AT-20) the coefficients of a corrected sensor would change by 0.034 degrees. */
+void test_acceleration_changes_the_coefficients_only_at_its_beginning(void)
+{
+    double worst = 0.0;
+    (void)drive(4000.0, 0.0, 5000);
+    for (int k = 0; k < 150; k++) {
+        (void)drive(4000.0 + 20.0 * k, 0.0, 1);
+        worst = (k > 30) ? fmax(worst, deviation()) : 0.0;
+    }
+    TEST_ASSERT_TRUE(worst < 0.027);
+}
+
+/* The correction acts through a table that is renewed in 16 steps. With mu = 1/16 a 16th of the second harmonic is
+ * corrected in a step just below 1/8 turn per step, which is damped; with mu = 1/4 it would grow. */
+void test_the_faster_correction_is_damped(void)
+{
+    (void)drive(7490.0, 0.0, 300);
+    for (int k = 0; k < 100; k++) {
+        (void)drive(7490.0, 0.0, 1);
+        TEST_ASSERT_TRUE(deviation() < 0.04);
+    }
+}
+
+/* Uncorrected samples through (AT-20), (AT-11) and (AT-12) in double precision, at a speed of the larger gain. The
+ * fixed point rounds each step by up to 1/2 LSB and sine and cosine to 2^-15: 100 steps of up to 5e5 LSB of d/16 have
+ * an error of 16 LSB each. */
 void test_coefficients_and_table_match_their_equations(void)
 {
-    double c[4] = {0}, last = 0.0, before = 0.0;
+    double c[4] = {0}, last = 0.0, before = 0.0, acceleration = 0.0;
+    config.max = 0x00FFFFFF;
     for (int k = 0; k < 100; k++) {
         theta += 6500.0 / 60e3;
         const double at = theta + sensor_error(theta);
@@ -117,18 +161,18 @@ void test_coefficients_and_table_match_their_equations(void)
             const double w = two_pi * last;
             const double wave[4] = {cos(w), sin(w), cos(2.0 * w), sin(2.0 * w)};
             for (int n = 0; n < 4; n++) {
-                c[n] += d * wave[n] / 64.0;
+                c[n] += (d - acceleration) * wave[n] / 16.0;
             }
+            acceleration += (d - acceleration) / 16.0;
         }
         before = last;
         last = at;
         angle_harmonics_step(&config, &state, counts(at), table);
     }
-    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[0], state.c[0]);
-    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[1], state.c[1]);
-    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[2], state.c[2]);
-    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[3], state.c[3]);
-    config.max = 0x00FFFFFF;
+    TEST_ASSERT_DOUBLE_WITHIN(1600.0, c[0], state.c[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1600.0, c[1], state.c[1]);
+    TEST_ASSERT_DOUBLE_WITHIN(1600.0, c[2], state.c[2]);
+    TEST_ASSERT_DOUBLE_WITHIN(1600.0, c[3], state.c[3]);
     state.c[0] = 3000000;
     state.c[3] = -2000000;
     state.c[1] = state.c[2] = 0;

@@ -74,6 +74,7 @@ void test_measurement_and_angle_are_the_si_values(void)
     TEST_ASSERT_EQUAL_UINT32((uint32_t)motor_si.pole_pairs << 21, motor.angle_tracker.repeat_max);
     HELD(0.1875 / wn, motor.angle_tracker.lag_steps, 1.0);
     HELD(0.005 / motor_si.period_s, motor.angle_tracker.stop_periods, 1.0);
+    HELD(0.02, motor.angle_tracker.stop_speed_q30 / 1073741824.0, 1e-6); /* in 5 ms, of 250 ms from the base */
 }
 
 void test_current_control_and_modulation_are_the_si_values(void)

@@ -13,6 +13,7 @@ static const plausibility_config_t config = {.answer_rate = Q15_MAX,
                                              .i_alive = 2400,
                                              .ripple_max = 1600,
                                              .zero_error_max = 492,
+                                             .behind_gain = 4 * Q16_ONE,
                                              .omega_trip = 32000,
                                              .inverter_trip_dC = 1050,
                                              .winding_trip_dC = 1800,
@@ -266,6 +267,19 @@ void test_a_phase_is_lost_only_if_its_reference_is_large_enough(void)
     state = (plausibility_state_t){0};
     in.phases.a = config.i_dead + 1;
     TEST_ASSERT_EQUAL_INT(-1, steps_until_the_same(FAULT_PHASE_LOST));
+}
+
+/* While 500 of the rotational voltage are missing, a current may be off its reference by 2000: with an alive threshold
+ * of 3000, a phase whose reference is up to 5000 may be without current. */
+void test_a_phase_is_not_lost_while_the_tracked_speed_is_behind(void)
+{
+    in.u_behind = 500;
+    in.i_ref = in.i = in.i_mean = (dq_q15_t){0, 24000};
+    in.phases_ref = in.phases = (abc_q15_t){5000, -10000, 5000};
+    in.phases.a = 0;
+    TEST_ASSERT_EQUAL_INT(-1, steps_until_the_same(FAULT_PHASE_LOST));
+    in.phases_ref.a = 5001;
+    TEST_ASSERT_EQUAL_INT(10, steps_until_the_same(FAULT_PHASE_LOST));
 }
 
 /* A phase without current is not lost if its reference is zero at this angle. */

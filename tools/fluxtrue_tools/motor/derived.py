@@ -31,6 +31,7 @@ ANGLE_JUMPS_S = 0.03  # of implausible samples: (MN-21)
 REPEAT_TURNS = 2 / 4096  # mechanical: two counts of the coarsest sensor, (AT-16)
 LAG_SHARE = 0.1875  # of the lag that a rotor which stops leaves behind the prediction: (AT-17)
 STOP_S = 0.005  # in which a slow rotor can stop: (AT-18)
+BASE_STOPS_S = 0.25  # from the speed base to standstill: (SS-5)
 ANGLE_HARMONIC_MAX_TURNS = 2 / 360  # electrical, of each harmonic's cosine and sine: a good sensor stays below half
 
 KNEE_LSB = 4
@@ -99,6 +100,7 @@ class Derived:
     psi_f_Vs: float
     tracker_bandwidth_rad_s: float
     tracker_jump_turns: float
+    stop_speed_rad_s: float
     sigma_rad_s: float
     setpoint_weight: float
     integral_ratio: float
@@ -159,6 +161,7 @@ class Derived:
     phase_alive_A: float
     ripple_A: float
     answer_rate: float
+    behind_A_per_V: float
     speed_trip_rad_s: float
     monitor_torque_Nm: float
     monitor_V: float
@@ -252,6 +255,13 @@ def missing_periods(config: MotorConfig) -> float:
 def _answer_rate(config: MotorConfig, bases: Bases) -> float:
     """Share of a change of the reference that the current follows in a step (CC-21); all with the usual law."""
     return 1.0 - (1.0 - TURNING_APPROACH) ** bases.periods_per_step if config.is_turning else 1.0
+
+
+def _behind_A_per_V(config: MotorConfig, model: FluxModel, bases: Bases) -> float:
+    """How far the current is off its reference if the rotational voltage is wrong by 1 V (MN-43)."""
+    l_min = min(float(model.psi_d(0.0, 0.0, nd=1)), float(model.psi_q(0.0, 0.0, nq=1)))
+    sigma = _current_control(bases.period_s)["sigma_rad_s"]
+    return 1.0 / (l_min * (TURNING_FEEDBACK / bases.period_s if config.is_turning else sigma))
 
 
 def frozen_settle_s(config: MotorConfig) -> float:
@@ -362,6 +372,7 @@ def _slow_monitors(config: MotorConfig, model: FluxModel, bases: Bases) -> dict[
         "phase_dead_A": PHASE_DEAD_SHARE * machine.i_max_A,
         # The fastest change of torque moves the current by this much per second; current control lags behind (TL-11).
         "answer_rate": _answer_rate(config, bases),
+        "behind_A_per_V": _behind_A_per_V(config, model, bases),
         "ripple_A": (RIPPLE_SHARE + SLEW_WEAK_PER_TORQUE_MAX * LOOP_MISSING_PERIODS * bases.period_s) * machine.i_max_A,
         "phase_alive_A": PHASE_ALIVE_SHARE * machine.i_max_A,
         "speed_trip_rad_s": (1.0 + SPEED_TRIP * reserve) * omega,
@@ -405,12 +416,24 @@ def _tracker(config: MotorConfig) -> dict[str, float]:
     }
 
 
+def _stop_speed_rad_s(config: MotorConfig, bases: Bases, bandwidth_rad_s: float) -> float:
+    """Tracked speed up to which a rotor may be at rest after STOP_S with the same angle (AT-18), (AT-21)."""
+    deceleration = bases.omega_rad_s / BASE_STOPS_S
+    tracked_rad_s = 2.0 * deceleration / bandwidth_rad_s  # when the rotor has stopped
+    count_rad = 2.0 * math.pi * config.machine.pole_pairs / 4096
+    seen_rad = deceleration / bandwidth_rad_s**2 - count_rad  # of the lag, in the worst case
+    hidden = seen_rad < LAG_SHARE * tracked_rad_s / bandwidth_rad_s
+    return 2.0 * tracked_rad_s if hidden else deceleration * STOP_S
+
+
 def derive(config: MotorConfig, model: FluxModel, bases: Bases) -> Derived:
     """All derived numbers of one motor."""
     psi_f = float(model.psi_d(0.0, 0.0))
+    tracker = _tracker(config)
     return Derived(
         psi_f_Vs=psi_f,
-        **_tracker(config),
+        **tracker,
+        stop_speed_rad_s=_stop_speed_rad_s(config, bases, tracker["tracker_bandwidth_rad_s"]),
         **_current_control(bases.period_s),
         **_modulation(config),
         **_identification(config, model, bases, psi_f),

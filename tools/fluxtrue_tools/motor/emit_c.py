@@ -157,6 +157,11 @@ def _tracker(motor: Motor) -> list[Row]:
             f"{REPEAT_TURNS:g} turn mechanical",
         ),
         ("lag_steps", f"{round(LAG_SHARE / w_ts)}u", f"{LAG_SHARE:g}/(w_n T_s)"),
+        (
+            "stop_speed_q30",
+            q31(d.stop_speed_rad_s / b.omega_rad_s / 2.0, "stop_speed"),
+            f"{d.stop_speed_rad_s:.4g} rad/s",
+        ),
         ("stop_periods", f"{round(STOP_S / b.period_s)}u", f"{1e3 * STOP_S:g} ms of periods"),
         ("turn_shift", f"{shift}u", ""),
     ]
@@ -466,6 +471,11 @@ def _plausibility(motor: Motor) -> list[Row]:
         ("ripple_max", q15(d.ripple_A / b.current_A, "ripple_max"), f"{d.ripple_A:.4g} A"),
         ("zero_error_max", q15(ZERO_ERROR_SHARE, "zero_error_max"), "of the converter's full scale"),
         ("answer_rate", q15(min(d.answer_rate, 1 - 1 / Q15_ONE), "answer_rate"), f"{d.answer_rate:.4g} per step"),
+        (
+            "behind_gain",
+            q16(d.behind_A_per_V * b.voltage_V / b.current_A, "behind_gain"),
+            f"{d.behind_A_per_V:.4g} A/V",
+        ),
         ("omega_trip", q15(d.speed_trip_rad_s / b.omega_rad_s, "omega_trip"), f"{d.speed_trip_rad_s:.6g} rad/s"),
         ("inverter_trip_dC", str(round(10 * thermal.inverter_trip_C)), ""),
         ("winding_trip_dC", str(round(10 * thermal.winding_trip_C)), ""),
