@@ -77,9 +77,9 @@ void angle_harmonics_step(const angle_harmonics_config_t *config, angle_harmonic
     state->before = state->last;
     state->last = theta;
     uint32_t part = state->part;
-    for (uint32_t n = 0; n < PARTS_PER_STEP; n++) {
+    do {
         table[part] = correction(state, part);
-        part = (part + 1U) % ANGLE_HARMONICS_PARTS;
-    }
-    state->part = (uint8_t)part;
+        part++;
+    } while (part % PARTS_PER_STEP != 0U);
+    state->part = (uint8_t)(part % ANGLE_HARMONICS_PARTS);
 }

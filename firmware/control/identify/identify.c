@@ -82,18 +82,16 @@ static FX_NOT_INLINED uint32_t update(identify_state_t *state, const jacobian_ro
 static void update_d_axis(identify_state_t *state)
 {
     identify_measurement_t *mean = &state->mean;
-    uint32_t exceeded = 0;
+    uint32_t report = 0;
     if (state->kept.update_valid) {
         const int32_t output_before = kalman_output(&state->kalman, &mean->q);
-        const uint32_t report = update(state, &mean->d, mean->e.d);
+        report = update(state, &mean->d, mean->e.d);
         const int32_t change = fx_sub_q31(kalman_output(&state->kalman, &mean->q), output_before);
         mean->e.q = fx_sub_q31(mean->e.q, change);
         state->kept.clamped = (report & KALMAN_CLAMPED) != 0U;
-        if ((report & KALMAN_GATE_EXCEEDED) != 0U) {
-            exceeded = count_up_to(state->gate_exceeded_updates, GATE_EXCEEDED_MAX);
-        }
     }
-    state->gate_exceeded_updates = (uint8_t)exceeded;
+    const uint32_t exceeded = count_up_to(state->gate_exceeded_updates, GATE_EXCEEDED_MAX);
+    state->gate_exceeded_updates = ((report & KALMAN_GATE_EXCEEDED) != 0U) ? (uint8_t)exceeded : 0U;
     state->steps = 0;
 }
 
@@ -104,8 +102,9 @@ static void update_q_axis(const identify_config_t *config, identify_state_t *sta
         const uint32_t report = update(state, &state->mean.q, state->mean.e.q);
         const uint32_t of_both = report | state->kept.clamped | state->gate_exceeded_updates;
         state->kept.clamped |= (report & KALMAN_CLAMPED) != 0U;
-        const int32_t error = fx_sat_q15_word(((of_both != 0U) ? Q15_MAX : 0) - state->kept.mismatch_share);
-        state->kept.mismatch_share = fx_add_q15(state->kept.mismatch_share, fx_mul_q15(config->mismatch_rate, error));
+        const int32_t share = state->kept.mismatch_share; /* from 0 to 1 */
+        const int32_t error = ((of_both != 0U) ? Q15_MAX : 0) - share;
+        state->kept.mismatch_share = fx_add_q15((q15_t)share, fx_mul_q15(config->mismatch_rate, error));
     }
     state->mean = (identify_measurement_t){.noise_q30 = 0};
 }
@@ -124,12 +123,15 @@ static void update_confidence(const identify_config_t *config, identify_state_t 
     const int32_t size = fx_abs_q15(torque);
     const int32_t full = size * config->confidence_full; /* Q30 */
     const int32_t none = fx_max_s32(size, config->torque_min) * config->confidence_none;
+    bool certain = state->kept.torque_certain;
     if (state->kept.mismatch_share > MISMATCH_MAX || (variance > 2 * well_below && variance > (int64_t)none * none)) {
-        state->kept.torque_certain = false;
+        certain = false;
     } else if (variance < well_below || variance < (int64_t)full * full) {
-        state->kept.torque_certain = true;
+        certain = true;
     }
-    const int32_t step = state->kept.torque_certain ? config->confidence_rate : -config->confidence_rate;
+    state->kept.torque_certain = certain;
+    const int32_t rate = config->confidence_rate;
+    const int32_t step = certain ? rate : -rate;
     state->kept.confidence = (q15_t)fx_usat_q15_word(state->kept.confidence + step);
 }
 
@@ -142,9 +144,9 @@ static void update_local_flux_error(const identify_config_t *config, identify_st
         const q15_t w = fx_q15_from_q31(in->point->omega);
         const int32_t square = fx_mul_q30(w, w) + fx_mul_q30(config->local_corner, config->local_corner);
         const q16_t gain = in->point->omega / fx_max_s32(square >> 15, 1); /* Q31/Q15 */
-        target = (dq_q30_t){fx_mul_gain_q31(gain, e.q), fx_neg_q31(fx_mul_gain_q31(gain, e.d))};
+        target = (dq_q30_t){fx_mul_gain_q31(gain, e.q), fx_mul_gain_q31(-gain, e.d)};
     }
-    const int32_t twice = fx_add_q31(config->local_rate, config->local_rate);
+    const int32_t twice = 2 * config->local_rate;
     dq_q30_t *local = &state->kept.local;
     local->d = fx_mulhi_add(local->d, twice, fx_sub_q31(target.d, local->d));
     local->q = fx_mulhi_add(local->q, twice, fx_sub_q31(target.q, local->q));
