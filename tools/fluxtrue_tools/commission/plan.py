@@ -27,7 +27,8 @@ BIASES = (0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.85)  # of -i_max
 BIAS_SLOWER = 3.5  # the current in d changes more slowly than that in q, and stays in its band
 LOST_MAX = 2  # bursts of all that may fail
 TRAVEL = 1.5  # of the time to the bias without saturation
-REVERSALS_D, REVERSALS_Q = 6, 3
+REVERSALS_D, REVERSALS_Q, REVERSALS_FEW = 6, 5, 3
+MOVES_RAD = 0.004  # electrical: a burst after one that moved the rotor further has few reversals
 MAGNET = 3.0  # times the guess of the magnet's flux linkage at most
 FIRST = (0.2, 0.9)  # share of its bound at which the first half wave may end
 
@@ -142,6 +143,11 @@ def balanced(
     return float(np.clip(np.interp(half, impulse, reached) / min(top_A, float(reached[-1])), *FIRST))
 
 
+def _reversals(last: Raw) -> int:
+    """Of a burst along q. Each half wave lasts, and so does what is left of a mean speed."""
+    return REVERSALS_FEW if last.moved_rad > MOVES_RAD else REVERSALS_Q
+
+
 def _ladder(drive: Capture, known: Nameplate, losses: Losses, steepest_A: float,
             of_q: bool) -> tuple[list[Raw], float]:  # fmt: skip
     """Larger and larger currents along one axis: each level's steepest change limits the voltage of the next."""
@@ -153,7 +159,7 @@ def _ladder(drive: Capture, known: Nameplate, losses: Losses, steepest_A: float,
         free = (-top, top)
         if of_q:
             half = balanced(raws[-1], losses, known.psi_f_Vs, top) if raws else Burst.first
-            burst = Burst(0.0, share, free, free, REVERSALS_Q, first=half)
+            burst = Burst(0.0, share, free, free, _reversals(raws[-1]) if raws else REVERSALS_Q, first=half)
         else:
             burst = Burst(share, 0.0, (-top, TOP_D * i_max_A), free, REVERSALS_D)
         raws.append(record(drive, burst, known))
@@ -182,6 +188,6 @@ def sweep(drive: Capture, found: First, known: Nameplate, losses: Losses) -> lis
         v_q = min(_voltage(_steepest_within(raws[-1], v_q, top), i_max_A, BIAS_STEP), FASTER * v_q)
         psi_f_Vs = magnet_Vs(raws[len(along_d) :], losses, known.psi_f_Vs)
         share = balanced(raws[-1], losses, psi_f_Vs, top, more_A, found.l_d_H * more_A)
-        raws.append(record(drive, Burst(v_d, v_q, (centre - band, centre + band), (-top, top), REVERSALS_Q, delay,
-                                        share), known))  # fmt: skip
+        raws.append(record(drive, Burst(v_d, v_q, (centre - band, centre + band), (-top, top), _reversals(raws[-1]),
+                                        delay, share), known))  # fmt: skip
     return raws

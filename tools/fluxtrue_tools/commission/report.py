@@ -36,10 +36,11 @@ def _levels(found: Found, known: Nameplate) -> list[str]:
     r = found.resistance
     if r is None or found.first is None:
         return []
+    knee = f"; half of it at a knee of {r.knee_A:.2g} A" if r.knee_A > 0.0 else ""
     return [
         f"resistance: {1e3 * r.r_ohm:.4g} mohm, ±{1e3 * r.r_sigma_ohm:.1g} mohm beyond the sensors' gains (guessed "
         f"{1e3 * known.r_ohm:.4g} mohm)",
-        f"inverter: a leg loses {r.total_V:.3g} V, {r.level_V:+.3g} V more than is compensated",
+        f"inverter: a leg loses {r.total_V:.3g} V, {r.level_V:+.3g} V more than is compensated{knee}",
         f"inductances at small currents: {1e3 * found.first.l_d_H:.4g} mH (d), {1e3 * found.first.l_q_H:.4g} mH (q)",
     ]
 
