@@ -222,6 +222,7 @@ void test_the_voltage_of_a_bridge_that_has_run_for_long_stays_known(void)
     for (int n = 0; n < 600; n++) {
         turn_periods(1);
         TEST_ASSERT_TRUE(published()->acting);
+        TEST_ASSERT_EQUAL_UINT8(3, drive.fast.periods_since_enable);
     }
 }
 
