@@ -56,6 +56,22 @@ void test_a_sensor_that_shows_no_speed_is_not_used(void)
     TEST_ASSERT_TRUE(needs(7000.0F, 350.0F));
 }
 
+/* At 2000 of the speed base the back-EMF is 1516, at 1000 758: 0.8 of a dc voltage of 1300 lies between them. */
+void test_from_half_of_the_speed_before_the_reset_on_the_present_one_counts(void)
+{
+    before.speed = 2000;
+    before.v_dc = 1300;
+    TEST_ASSERT_FALSE(after_reset_needs_short_circuit(&motor, &before, 1000, 1300));
+    TEST_ASSERT_TRUE(after_reset_needs_short_circuit(&motor, &before, 999, 1300));
+}
+
+void test_a_magnet_that_was_found_stronger_is_taken_into_account(void)
+{
+    TEST_ASSERT_FALSE(needs(7000.0F, 350.0F));
+    before.psi_d_error = Q15(0.05);
+    TEST_ASSERT_TRUE(needs(7000.0F, 350.0F));
+}
+
 void test_a_bridge_that_was_not_armed_is_left_alone(void)
 {
     before.armed = false;
@@ -67,9 +83,12 @@ void test_what_is_kept_is_what_the_drive_knows(void)
     drive.task.safe_state.speed = 1234;
     drive.task.armed = true;
     drive.psi_d_error = -5;
+    sample_box_begin(&drive.samples)->v_dc = 12345;
+    sample_box_publish(&drive.samples);
     before_reset_t kept;
     before_reset(&drive, &kept);
     TEST_ASSERT_EQUAL_INT16(1234, kept.speed);
+    TEST_ASSERT_EQUAL_INT16(12345, kept.v_dc);
     TEST_ASSERT_EQUAL_INT16(-5, kept.psi_d_error);
     TEST_ASSERT_TRUE(kept.armed && kept.speed_valid);
     drive.fast.faults = FAULT_ANGLE;

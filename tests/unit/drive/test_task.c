@@ -48,6 +48,9 @@ void test_the_shipped_motor_is_valid_and_starts_off(void)
 {
     TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, drive_motor_check(&drive));
     TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    static drive_t other;
+    drive_init(&other, &motor);
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, other.task.reference.psi_plan); /* no field weakening before the first step */
     task_1khz(&drive);
     TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
     TEST_ASSERT_FALSE(command()->run);
@@ -311,6 +314,51 @@ void test_too_much_torque_counts_more_from_a_fast_change_of_speed_until_it_ends(
         drive.task.identification.torque_estimated = (q15_t)(sign * 11000);
         TEST_ASSERT_EQUAL_INT(sign * 11000, tracked_speed_estimate(&drive, &snapshot));
         TEST_ASSERT_EQUAL_UINT8(0, drive.task.excessive);
+    }
+}
+
+static int32_t far_behind(double omega_pu, int32_t lag)
+{
+    const snapshot_t snapshot = {.sample = {.point = {.omega = (q31_t)(omega_pu * 2147483648.0)}}, .lag = (q15_t)lag};
+    return tracked_speed_far_behind(&snapshot);
+}
+
+/* A 32nd of the speed, at least of 4096 counts, is not far; more than 2048 counts are no rotor's lag. */
+void test_the_lag_of_the_speed_counts_between_its_bounds_to_a_count(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        TEST_ASSERT_EQUAL_INT32(0, far_behind(0.0, sign * 128));
+        TEST_ASSERT_EQUAL_INT32(sign, far_behind(0.125, sign * 129));
+        TEST_ASSERT_EQUAL_INT32(0, far_behind(0.25, sign * 256));
+        TEST_ASSERT_EQUAL_INT32(sign, far_behind(-0.25, sign * 257));
+        TEST_ASSERT_EQUAL_INT32(sign * (2048 - 128), far_behind(0.0, sign * 2048));
+        TEST_ASSERT_EQUAL_INT32(0, far_behind(0.0, sign * 2049));
+    }
+}
+
+/* At standstill the positive direction counts. */
+void test_the_planned_speed_is_never_smaller_than_the_tracked_one(void)
+{
+    const snapshot_t forward = {.lag = 200}, backward = {.lag = -200};
+    TEST_ASSERT_EQUAL_INT(72, tracked_speed_planned(&forward));
+    TEST_ASSERT_EQUAL_INT(0, tracked_speed_planned(&backward));
+}
+
+/* 3 % of 10,000 are 300 counts; without a commanded torque the positive direction counts. */
+void test_torque_is_too_much_from_a_count_beyond_three_percent_on(void)
+{
+    static const struct {
+        int commanded, estimated;
+        uint8_t steps;
+    } cases[] = {{10000, 10300, 0}, {10000, 10301, 1}, {-10000, -10300, 0}, {-10000, -10301, 1}, {0, 5000, 1}};
+    const snapshot_t snapshot = {.lag = 1500};
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        drive.task.excessive = 0;
+        drive.task.torque_commanded = (q15_t)cases[n].commanded;
+        drive.task.torque_loop.model = cases[n].commanded * 65536;
+        drive.task.identification.torque_estimated = (q15_t)cases[n].estimated;
+        (void)tracked_speed_estimate(&drive, &snapshot);
+        TEST_ASSERT_EQUAL_UINT8(cases[n].steps, drive.task.excessive);
     }
 }
 
