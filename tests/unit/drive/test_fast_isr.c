@@ -767,6 +767,10 @@ void test_where_the_field_turns_far_the_knee_widens_with_speed(void)
     TEST_ASSERT_EQUAL_MEMORY(&given, &at_rest, sizeof given);
     const modulate_config_t slow = turning_modulate(&given, 10 << 20, 9 << 22);
     TEST_ASSERT_EQUAL_MEMORY(&given, &slow, sizeof given);
+    modulate_config_t rounded = given;
+    rounded.knee_side_q17 = 908000; /* of the generated data: an equal knee is no reason to compute it again */
+    const modulate_config_t equal = turning_modulate(&rounded, 11 << 20, 11 << 22);
+    TEST_ASSERT_EQUAL_MEMORY(&rounded, &equal, sizeof rounded);
     for (int sign = -1; sign <= 1; sign += 2) {
         const modulate_config_t fast = turning_modulate(&given, 10 << 20, sign * (101 << 22));
         TEST_ASSERT_EQUAL_INT32((10 << 20) / 101, fast.knee_q17);
