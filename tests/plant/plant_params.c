@@ -53,11 +53,11 @@ static const char *bad_machine(const plant_params_t *p, int has_map)
         {"pole_pairs", above_zero(p->pole_pairs) && p->pole_pairs == floor(p->pole_pairs)},
         {"r_ohm_20", not_below_zero(p->r_ohm_20)},
         {"r_temp_coeff_per_K", isfinite(p->r_temp_coeff_per_K)},
-        {"winding_C", isfinite(p->winding_C)},
+        {"winding_C", isfinite(p->winding_C) && p->r_temp_coeff_per_K * (p->winding_C - 20.0) > -1.0}, /* R > 0 */
         {"ld_H", has_map || above_zero(p->ld_H)},
         {"lq_H", has_map || above_zero(p->lq_H)},
         {"psi_f_Vs", has_map || isfinite(p->psi_f_Vs)},
-        {"magnet_scale", isfinite(p->magnet_scale)},
+        {"magnet_scale", not_below_zero(p->magnet_scale)},
         {"magnet_temp_coeff_per_K", isfinite(p->magnet_temp_coeff_per_K)},
         {"rotor_C", isfinite(p->rotor_C)},
         {"lq_scale", above_zero(p->lq_scale)},

@@ -55,6 +55,9 @@ void test_impossible_machines_are_refused_by_name(void)
     REFUSE(r_ohm_20, -0.01);
     REFUSE(r_temp_coeff_per_K, nan);
     REFUSE(winding_C, inf);
+    p.r_temp_coeff_per_K = 0.004;
+    REFUSE(winding_C, -230.0); /* R = 0 */
+    REFUSE(magnet_scale, -0.1);
     REFUSE(ld_H, 0.0);
     REFUSE(lq_H, -1e-3);
     REFUSE(psi_f_Vs, nan);
