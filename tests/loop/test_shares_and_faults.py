@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -113,6 +114,31 @@ def test_a_trip_is_marked_in_every_panel_and_named_in_one(hsm1: Motor) -> None:
         assert any(next(iter(line.get_xdata())) == time_s for line in axes.lines if len(line.get_xdata()) == 2)
     texts = [text.get_text() for axes in sheet.axes for text in axes.texts]
     assert sum("over_current" in text for text in texts) == 1
+    plt.close(sheet)
+
+
+def test_names_of_faults_close_together_are_not_written_over_each_other(hsm1: Motor) -> None:
+    """An offset of one sensor at a stuck angle: three faults within 10 ms of a run of 1 s."""
+    added = "[[event]]\nt = 0.3\nset = { 'plant.current_offset_A_b' = 60, 'plant.angle_stuck' = true }"
+    head = 'motor = "hsm1"\nduration_s = 1.0\n[profile]\ntorque_Nm = 60\nspeed_rpm = 9500\n'
+    run = simulate(parse(head + added, "s.toml"), hsm1)
+    assert len(run.faults()) > 1
+    sheet = plot.figure(run, "trip")
+    sheet.canvas.draw()
+    texts = [text for axes in sheet.axes for text in axes.texts]
+    assert sorted("\n".join(text.get_text() for text in texts).split("\n")) == sorted(
+        name for _, names in run.faults() for name in names)  # fmt: skip
+    boxes = [text.get_window_extent() for text in texts]
+    assert not any(a.overlaps(b) for a, b in pairwise(boxes))
+    assert all(box.x0 >= 0 for box in boxes)
+    plt.close(sheet)
+
+
+@pytest.mark.parametrize(("added", "panels"), [("identification = false\ntorque_loop = false", 6), ("", 10)])
+def test_panels_of_an_identification_that_is_off_are_not_drawn(hsm1: Motor, added: str, panels: int) -> None:
+    text = HEAD + "[profile]\ntorque_share = 0.3\nspeed_share = 0.2\n[controller]\n" + added
+    sheet = plot.figure(simulate(parse(text, "s.toml"), hsm1), "panels")
+    assert len(sheet.axes) == panels
     plt.close(sheet)
 
 

@@ -12,9 +12,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fluxtrue_tools.sim.run import Recording
+from fluxtrue_tools.sim.run import IDENTIFIED, Recording
 
 COMMAND, TRUTH, ESTIMATE, SECOND, FAULT = "#7f7f7f", "#1f4e79", "#d1495b", "#edae49", "#b00020"
+NAMES_APART = 0.03  # of the time axis, for each line of text
 STYLE: dict[Any, Any] = {
     "axes.grid": True,
     "axes.spines.right": False,
@@ -134,20 +135,37 @@ def _widen(axes: Axes, span: float) -> None:
         axes.set_ylim(middle - span, middle + span)
 
 
-def _mark_faults(axes: Axes, run: Recording, named: bool) -> None:
-    """A line where the drive tripped, through every panel; its name in one."""
+def _close_together(run: Recording) -> list[tuple[float, list[str]]]:
+    """The faults by time; those whose names would be written over each other are one entry."""
+    span = run.scenario.duration_s
+    groups: list[tuple[float, list[str]]] = []
     for time_s, names in run.faults():
+        if groups and time_s - groups[-1][0] < NAMES_APART * span * len(groups[-1][1]):
+            groups[-1][1].extend(names)
+        else:
+            groups.append((time_s, list(names)))
+    return groups
+
+
+def _mark_faults(axes: Axes, run: Recording, named: bool) -> None:
+    """A line where the drive tripped, through every panel; the names in one, a line of text for each."""
+    for time_s, _ in run.faults():
         axes.axvline(time_s, color=FAULT, ls=":", lw=1.1)
-        if named:
-            axes.annotate(", ".join(names), (time_s, 0.98), xycoords=("data", "axes fraction"), rotation=90,
-                          ha="right", va="top", color=FAULT, fontsize=8,
-                          bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0})  # fmt: skip
+    for time_s, names in _close_together(run) if named else []:
+        axes.annotate("\n".join(names), (time_s, 0.98), xycoords=("data", "axes fraction"), rotation=90,
+                      ha="right", va="top", color=FAULT, fontsize=8,
+                      bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0})  # fmt: skip
+
+
+def _identified(run: Recording) -> bool:
+    """Whether the robust identification found anything: without it its panels would be straight lines."""
+    return "lq_scale" in run.columns and any(bool(np.ptp(run[name])) for name in IDENTIFIED)
 
 
 def figure(run: Recording, title: str) -> Figure:
-    """Torque, currents, flux, resistance, speed and voltages; for the firmware also what else it identified."""
+    """Torque, currents, flux, resistance, speed, voltages; with the robust identification also what else it found."""
     panels = [torque, _currents, flux, resistance, _speed, _voltage]
-    panels += [_scales, _residues, _local, _confidence] if "lq_scale" in run.columns else []
+    panels += [_scales, _residues, _local, _confidence] if _identified(run) else []
     rows = len(panels) // 2
     with plt.rc_context(STYLE):
         sheet, axes = plt.subplots(rows, 2, figsize=(11, 2.7 * rows), sharex=True, layout="constrained")
