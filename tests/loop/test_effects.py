@@ -43,6 +43,22 @@ CASES = [
     ("[controller]\nresistance_bandwidth_rad_s = 90", "controller.resistance_bandwidth_rad_s", None),
     ("[controller]\nobserver_m = 2.5", "controller.observer_m",
      "[controller]\nobserver_m = 2.5\nidentification_mode = 'paper'"),
+    ("[controller]\ntrim = 0\nidentification_mode = 'paper'", "controller.trim", None),
+    ("[controller]\ntorque_requested_Nm = 20", "controller.torque_requested_Nm", None),
+    ("[controller]\nid_ref_A = -20", "controller.id_ref_A", "[controller]\nid_ref_A = -20\ncurrent_mode = 1"),
+    ("[controller]\niq_ref_A = 20", "controller.iq_ref_A", "[controller]\niq_ref_A = 20\ncurrent_mode = 1"),
+    ("[controller]\npulses_id_low_A = -9", "controller.pulses_id_low_A", None),
+    ("[plant]\nangle_spike_every = 12\nangle_spike_samples = 1", "plant.angle_spike_every",
+     "[plant]\nangle_spike_every = 12\nangle_spike_samples = 1\nangle_spike_rad = 0.1"),
+    ("[plant]\nangle_spike_samples = 1\nangle_spike_rad = 0.1", "plant.angle_spike_samples",
+     "[plant]\nangle_spike_every = 12\nangle_spike_samples = 1\nangle_spike_rad = 0.1"),
+    ("[plant]\nangle_spike_rad = 0.1\nangle_spike_every = 12", "plant.angle_spike_every",
+     "[plant]\nangle_spike_every = 12\nangle_spike_samples = 1\nangle_spike_rad = 0.1"),
+    ("[plant]\nshort_circuit_A = 900", "plant.short_circuit_A", None),
+    ("[plant]\ndesaturation_s = 1e-6", "plant.desaturation_s",
+     "[plant]\ndesaturation_s = 1e-3\nswitch_shorted_upper = [true, false, false]"),
+    ("[plant]\ndesaturation_open = true", "plant.desaturation_open",
+     "[plant]\ndesaturation_open = true\nswitch_shorted_upper = [true, false, false]"),
     ("[[event]]\nt = 0.03\nset = { 'plant.theta_m_rad' = 1 }", "event.0.set.plant.theta_m_rad",
      "[plant]\ntheta_m_rad = 1"),
     ("[[event]]\nt = 0.03\nset = { 'plant.seed' = 9 }", "event.0.set.plant.seed", None),
@@ -99,6 +115,33 @@ def test_constants_on_a_machine_with_a_map_are_refused(name: str, hsm1: Motor, p
             simulate(parse(text_of(added), "s.toml"), hsm1, where="s.toml")
     changed = parse(text_of(f"[plant]\n{name} = {1.2 * paper.plant[name]}"), "s.toml")
     assert not np.array_equal(bits(changed, paper), bits(parse(text_of(""), "s.toml"), paper))
+
+
+def test_a_seed_without_noise_is_refused(hsm1: Motor) -> None:
+    with pytest.raises(FluxtrueError, match=r"^s\.toml: seed: has no effect here: plant\.current_noise_A_rms is 0"):
+        parse("seed = 7\n" + text_of(""), "s.toml")
+    silent = _parsed_without_check("seed = 7\n" + text_of(""))
+    assert np.array_equal(bits(silent, hsm1), bits(parse(text_of(""), "s.toml"), hsm1))
+    noise = text_of("[plant]\ncurrent_noise_A_rms = 0.5")
+    assert not np.array_equal(bits(parse("seed = 7\n" + noise, "s.toml"), hsm1), bits(parse(noise, "s.toml"), hsm1))
+
+
+def test_a_name_that_the_twin_does_not_have_is_told_from_one_that_does_not_exist(hsm1: Motor) -> None:
+    twin = text_of("[controller]\nkind = 'twin'\ntrim = 1")
+    with pytest.raises(FluxtrueError, match=r"controller\.trim = 1: the twin has no such name; allowed with"):
+        simulate(parse(twin, "s.toml"), hsm1, where="s.toml")
+
+
+@pytest.mark.parametrize(("added", "said"), [
+    ("winding_C = -400", r"profile\.winding_C = -400 °C, allowed: above -234\.453 °C"),
+    ("winding_C = [[0, 20], [0.05, -300]]", r"profile\.winding_C reaches -300 °C at t = 0\.05 s, allowed: above"),
+    ("magnet_scale = -0.1", r"profile\.magnet_scale = -0\.1, allowed: from 0$"),
+    ("[plant]\nr_ohm_20 = nan", r"plant\.r_ohm_20 = nan Ω, allowed: a finite number above 0 Ω"),
+    ("[plant]\nrotor_C = nan", r"plant\.rotor_C = nan °C, allowed: a finite number, in °C"),
+])  # fmt: skip
+def test_what_no_machine_can_be_is_refused(added: str, said: str, hsm1: Motor) -> None:
+    with pytest.raises(FluxtrueError, match=said):
+        simulate(parse(text_of(added), "s.toml"), hsm1, where="s.toml")
 
 
 def test_cross_saturation_of_a_machine_with_constants_is_refused(hsm1: Motor, paper: Motor) -> None:

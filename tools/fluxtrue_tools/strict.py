@@ -144,7 +144,8 @@ def allowed(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
     if kind is str:
         longest = next((item.max_length for item in metadata if getattr(item, "max_length", None)), None)
         return f"text of 1 to {longest} characters" if longest else "text, not empty"
-    return f"{_nouns(kind)}{_range(metadata)} {unit}".strip()
+    span = _range(metadata)
+    return f"{_nouns(kind)}{span}{' ' if span or not unit else ', in '}{unit}".strip()
 
 
 def _keys(model: type[BaseModel], location: tuple[int | str, ...]) -> str:

@@ -23,6 +23,7 @@ speed_rpm = 500
 vdc_V = 340
 [plant]
 current_gain = [1.0, 1.01, 1.0]
+current_noise_A_rms = 0.1
 dead_time_s = 1e-6
 [[event]]
 t = 0.005

@@ -109,6 +109,8 @@ def complaint(error: lib.LoopError, key: str, motor: Motor, loop: lib.Loop | Non
     shown = strict.quantity(key, tidy(error.value)) if error.value is not None else key
     if error.code == lib.UNKNOWN_NAME:
         names = motor.names()
+        if error.name in names:
+            return f"{shown}: the twin has no such name; allowed with controller.kind = 'firmware'"
         near = difflib.get_close_matches(error.name, names, n=3) or names
         return f"{shown}: no such name, allowed: {', '.join(near)}"
     if error.code != lib.OUT_OF_RANGE or error.value is None:

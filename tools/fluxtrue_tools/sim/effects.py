@@ -13,8 +13,12 @@ if TYPE_CHECKING:
 Found = tuple[str, str]  # key, why
 
 PAPER_GAINS = ("observer_m", "flux_bandwidth_rad_s", "resistance_bandwidth_rad_s")
+ROBUST_ONLY = ("trim",)
 MAP_INSTEAD = ("ld_H", "lq_H", "psi_f_Vs")
 ONLY_WITH_MAP = ("cross_saturation_scale",)
+SPIKE = ("angle_spike_every", "angle_spike_samples", "angle_spike_rad")
+OF_A_SHORTED_SWITCH = ("short_circuit_A", "desaturation_s", "desaturation_open")
+ONLY_WHILE = {"current_mode": ("id_ref_A", "iq_ref_A"), "pulses": ("pulses_",)}  # beginnings of names
 AT_START = {"plant.seed": "seed", "plant.theta_m_rad": "plant.theta_m_rad"}
 
 
@@ -34,6 +38,11 @@ class _Plant:
     def is_on(self, name: str) -> bool:
         """Whether a flag is given as true and no event changes it."""
         return bool(getattr(self.table, name)) and f"plant.{name}" not in self.events
+
+    def has_shorted_switch(self) -> bool:
+        """Whether a switch is shorted at any time."""
+        at_start = (getattr(self.table, f"switch_shorted_{side}") or () for side in ("upper", "lower"))
+        return any(map(any, at_start)) or any(name.startswith("plant.switch_shorted_") for name in self.events)
 
 
 def _points(scenario: "Scenario") -> Iterator[Found]:
@@ -63,6 +72,9 @@ def _inverter(plant: _Plant) -> Iterator[Found]:
         yield "plant.vdc_ripple_hz", "plant.vdc_ripple_V is 0"
     if plant.always("vdc_ripple_hz", 0.0):
         yield "plant.vdc_ripple_V", "plant.vdc_ripple_hz is 0"
+    if not plant.has_shorted_switch():
+        for name in OF_A_SHORTED_SWITCH:
+            yield f"plant.{name}", "no switch is shorted (plant.switch_shorted_upper, plant.switch_shorted_lower)"
 
 
 def _sensors(plant: _Plant) -> Iterator[Found]:
@@ -71,6 +83,10 @@ def _sensors(plant: _Plant) -> Iterator[Found]:
         yield f"plant.angle_h{k}_phase", f"plant.angle_h{k}_rad is 0"
     if len(silent) == 2:
         yield "plant.resolver_pole_pairs", "plant.angle_h1_rad and plant.angle_h2_rad are 0"
+    for zero in (name for name in SPIKE if plant.always(name, 0)):
+        for name in SPIKE:
+            if name != zero:
+                yield f"plant.{name}", f"plant.{zero} is 0"
 
 
 def _friction(plant: _Plant) -> Iterator[Found]:
@@ -101,10 +117,19 @@ def _machine(scenario: "Scenario", plant: _Plant) -> Iterator[Found]:
 
 
 def _controller(scenario: "Scenario", plant: _Plant) -> Iterator[Found]:
-    if scenario.controller.identification_mode == "robust" and "identification_mode" not in plant.events:
-        for name in PAPER_GAINS:
-            if name in (scenario.controller.__pydantic_extra__ or {}):
-                yield f"controller.{name}", "it belongs to controller.identification_mode = 'paper'"
+    calibration = scenario.controller.__pydantic_extra__ or {}
+    mode = scenario.controller.identification_mode
+    idle = PAPER_GAINS if mode == "robust" else ROBUST_ONLY
+    other = "paper" if mode == "robust" else "robust"
+    if "identification_mode" not in plant.events:
+        for name in filter(calibration.__contains__, idle):
+            yield f"controller.{name}", f"it belongs to controller.identification_mode = '{other}'"
+    if "torque_requested_Nm" in calibration:
+        yield "controller.torque_requested_Nm", f"{scenario.profile.key('torque_Nm')} requests the torque"
+    for switch, beginnings in ONLY_WHILE.items():
+        if not calibration.get(switch) and switch not in plant.events:
+            for name in (name for name in calibration if name.startswith(beginnings)):
+                yield f"controller.{name}", f"controller.{switch} is 0"
 
 
 def _events(scenario: "Scenario", plant: _Plant) -> Iterator[Found]:
@@ -119,6 +144,8 @@ def _found(scenario: "Scenario") -> Iterator[Found]:
     yield from _points(scenario)
     yield from _mechanics(scenario, plant)
     yield from _controller(scenario, plant)
+    if "seed" in scenario.given() and plant.always("current_noise_A_rms", 0.0):
+        yield "seed", "plant.current_noise_A_rms is 0, and only this noise is random"
     yield from _events(scenario, plant)
     for key, why in (*_inverter(plant), *_sensors(plant), *_friction(plant), *_machine(scenario, plant)):
         if key.removeprefix("plant.") in plant.given:
