@@ -98,5 +98,5 @@ def check_names(campaign: Campaign, machine: Machine, where: str) -> None:
                 loop.record(recorded)
         except LoopError as error:
             key = error.name if error.name.startswith("plant.") else f"controller.{index}.set.{error.name}"
-            key = "check.count_nonzero" if error.name in campaign.check.count_nonzero else key
+            key = f"check.count_nonzero: {error.name!r}" if error.name in campaign.check.count_nonzero else key
             raise FluxtrueError(f"{where}: {complaint(error, key, machine.motor)}") from error
