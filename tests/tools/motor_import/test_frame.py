@@ -104,6 +104,8 @@ def test_too_few_currents_are_refused() -> None:
         (math.sqrt(2.0), POLE_PAIRS, "it would fit with --current rms or --flux rms"),
         (2.0 / 3.0, POLE_PAIRS, "--current power --flux power"),
         (1e-3, POLE_PAIRS, "--flux-unit mVs"),
+        (2e-3, POLE_PAIRS, "it would fit with --current rms --flux rms --flux-unit mVs"),
+        (1e-3 * math.sqrt(2.0), POLE_PAIRS, "it would fit with --flux-unit mVs, and --current rms or --flux rms"),
         (1.0, 3, "machine.pole_pairs = 4"),
         (0.789, POLE_PAIRS, "allowed: 0.95 to 1.05 times$"),
     ],

@@ -148,6 +148,8 @@ def _ratios(pole_pairs: int) -> Iterator[tuple[float, str]]:
     yield 2.0 / 3.0, "--current power --flux power"
     yield 1e-3, "--flux-unit mVs"
     yield 1e3, "--flux-unit Vs"
+    yield 2e-3, "--current rms --flux rms --flux-unit mVs"
+    yield 1e-3 * math.sqrt(2.0), "--flux-unit mVs, and --current rms or --flux rms"
     for count in range(1, 25):
         if count != pole_pairs:
             yield count / pole_pairs, f"machine.pole_pairs = {count}"
