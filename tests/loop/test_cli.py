@@ -160,7 +160,7 @@ SHIPPED = sorted(SCENARIOS.glob("*.toml"))
 def test_a_shipped_scenario_gives_torque_and_speed_as_shares(path: Path, paper: Motor, hsm1: Motor) -> None:
     """Motors other than the scenario's own use its values, too."""
     profile = tomllib.loads(path.read_text(encoding="utf-8"))["profile"]
-    assert "torque_share" in profile and not {"torque_Nm", "speed_rpm"} & set(profile)
+    assert "torque_share" in profile and not {"torque_Nm", "speed_rpm", "load_Nm"} & set(profile)
     short = read(path).model_copy(update={"duration_s": 0.1, "event": (), "expect_fault": None, "window": Window()})
     for motor in (paper, hsm1):
         assert simulate(short, motor, where=path.name).fault_word == 0
