@@ -81,14 +81,19 @@ bool can_tx_due(can_tx_t *tx)
     return tx->pending != 0U;
 }
 
+static bool is_pending(const can_tx_t *tx, uint32_t number)
+{
+    return ((uint32_t)tx->pending >> number & 1U) != 0U;
+}
+
 bool can_tx_may_send_temperatures(const can_tx_t *tx)
 {
-    return (tx->pending & 1U << NUMBER_inv_temperatures) != 0U;
+    return is_pending(tx, NUMBER_inv_temperatures);
 }
 
 bool can_tx_may_send_identification(const can_tx_t *tx)
 {
-    return (tx->pending & 1U << NUMBER_inv_identification) != 0U;
+    return is_pending(tx, NUMBER_inv_identification);
 }
 
 tx_result_t can_tx_next(can_tx_t *tx, const telemetry_t *telemetry, can_frame_t *frame)

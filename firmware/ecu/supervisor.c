@@ -189,7 +189,8 @@ static uint32_t conditions(const supervisor_t *s, const supervisor_in_t *in)
 
 static void take_transition(supervisor_t *s, uint32_t now)
 {
-    for (uint32_t n = supervisor_first[s->state]; n < supervisor_first[s->state + 1U]; n++) {
+    const uint8_t *first = &supervisor_first[s->state]; /* behind it the first row of the next state */
+    for (uint32_t n = first[0]; n < first[1]; n++) {
         const transition_t *row = &supervisor_table[n];
         if (row->from == s->state && (row->when & now) == row->when) {
             s->state = row->to;

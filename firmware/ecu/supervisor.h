@@ -60,6 +60,7 @@
 #define REFUSED_VALUE(name, value, text) REFUSED_##name = (value),
 // NOLINTNEXTLINE(cert-int09-c,readability-enum-initial-value): STATES is their number
 typedef enum { ECU_STATE_LIST(STATE_VALUE) STATES } ecu_state_t;
+#define STATES_AND_END (STATES + 1)
 typedef enum { ECU_FAULT_LIST(ECU_FAULT_BIT) } ecu_fault_t;
 typedef enum { REFUSED_LIST(REFUSED_VALUE) } refused_t;
 #undef STATE_VALUE
@@ -132,7 +133,7 @@ typedef struct {
 
 extern const transition_t supervisor_table[];
 /** The first row of each state, and behind the last state the number of rows. */
-extern const uint8_t supervisor_first[STATES + 1];
+extern const uint8_t supervisor_first[STATES_AND_END];
 extern const state_outputs_t supervisor_outputs[STATES];
 
 void supervisor_step(supervisor_t *supervisor, const supervisor_in_t *in);

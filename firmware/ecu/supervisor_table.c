@@ -33,9 +33,9 @@ const transition_t supervisor_table[] = {
     {STATE_DISCHARGE, WHEN_DISCHARGE_FAILED, STATE_FAULT},
 };
 
-#define ROWS 25
+#define ROWS 25U
 
-const uint8_t supervisor_first[STATES + 1] = {
+const uint8_t supervisor_first[STATES_AND_END] = {
     [STATE_INIT] = 0,    [STATE_STANDBY] = 2, [STATE_PRECHARGE] = 4,   [STATE_READY] = 7,      [STATE_RUN] = 11,
     [STATE_DERATE] = 15, [STATE_FAULT] = 20,  [STATE_SAFE_STATE] = 19, [STATE_DISCHARGE] = 22, [STATES] = ROWS,
 };

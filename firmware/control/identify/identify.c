@@ -100,10 +100,12 @@ static void update_q_axis(const identify_config_t *config, identify_state_t *sta
 {
     if (state->kept.update_valid) {
         const uint32_t report = update(state, &state->mean.q, state->mean.e.q);
-        const uint32_t of_both = report | state->kept.clamped | state->gate_exceeded_updates;
-        state->kept.clamped |= (report & KALMAN_CLAMPED) != 0U;
+        const bool exceeded = (report | state->gate_exceeded_updates) != 0U || state->kept.clamped; /* either axis */
+        if ((report & KALMAN_CLAMPED) != 0U) {
+            state->kept.clamped = true;
+        }
         const int32_t share = state->kept.mismatch_share; /* from 0 to 1 */
-        const int32_t error = ((of_both != 0U) ? Q15_MAX : 0) - share;
+        const int32_t error = (exceeded ? Q15_MAX : 0) - share;
         state->kept.mismatch_share = fx_add_q15((q15_t)share, fx_mul_q15(config->mismatch_rate, error));
     }
     state->mean = (identify_measurement_t){.noise_q30 = 0};

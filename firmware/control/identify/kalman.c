@@ -27,9 +27,12 @@ static int32_t round_shift(int64_t x, unsigned n)
 /* Not inlined: one copy takes less memory. */
 static FX_NOT_INLINED int64_t dot(const int32_t *a, const int32_t *b)
 {
+    const int32_t *const end = &a[IDENTIFY_STATES];
     int64_t sum = 0;
-    for (const int32_t *const end = &a[IDENTIFY_STATES]; a != end; a++, b++) {
+    while (a != end) {
         sum += (int64_t)*a * *b;
+        a++;
+        b++;
     }
     return sum;
 }
@@ -67,12 +70,17 @@ static int64_t project_covariance(const kalman_t *kalman, const jacobian_row_t *
         int64_t sum = 1 << 29; /* half a bit of the result */
         const int32_t *p = &kalman->p_q30[j];
         const int32_t *h = row->h_q30;
-        for (unsigned step = IDENTIFY_STATES - 1U; h != &row->h_q30[j]; step--) { /* down the column to the diagonal */
-            sum += (int64_t)*p * *h++;
+        unsigned step = IDENTIFY_STATES - 1U;
+        while (h != &row->h_q30[j]) { /* down the column to the diagonal */
+            sum += (int64_t)*p * *h;
+            h++;
             p += step;
+            step--;
         }
         while (h != end) { /* then along the row */
-            sum += (int64_t)*p++ * *h++;
+            sum += (int64_t)*p * *h;
+            h++;
+            p++;
         }
         ph_q30[j] = (int32_t)(sum >> 30);
     }
@@ -118,9 +126,12 @@ static bool update_state(int32_t *x_q27, int32_t gain_q24, int32_t innovation_q3
  * |k_j (P h')_l| <= 1. */
 static int32_t *update_row(int32_t *p, int32_t gain_q24, const int32_t *ph_q30, unsigned n)
 {
-    for (; n != 0U; n--) {
-        const int64_t reduction = (int64_t)gain_q24 * *ph_q30++ + (1 << 23);
-        *p++ -= (int32_t)(reduction >> 24);
+    const int32_t *const end = &p[n];
+    while (p != end) {
+        const int64_t reduction = (int64_t)gain_q24 * *ph_q30 + (1 << 23);
+        *p -= (int32_t)(reduction >> 24);
+        ph_q30++;
+        p++;
     }
     return p;
 }
