@@ -192,7 +192,7 @@ static void take_transition(supervisor_t *s, uint32_t now)
     const uint8_t *first = &supervisor_first[s->state]; /* behind it the first row of the next state */
     for (uint32_t n = first[0]; n < first[1]; n++) {
         const transition_t *row = &supervisor_table[n];
-        if (row->from == s->state && (row->when & now) == row->when) {
+        if ((row->when & now) == row->when) {
             s->state = row->to;
             s->us = 0;
             return;
