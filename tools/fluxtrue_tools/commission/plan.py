@@ -15,7 +15,7 @@ from fluxtrue_tools.motor.flux_model import Array
 
 FIRST_VOLTAGE = 0.15  # with the smallest inductance that is allowed for, 0.2 of i_max in a period
 FIRST_CURRENT = 0.1  # of i_max
-VOLTAGES = (0.12, 0.68)
+VOLTAGES = (0.12, 0.55)
 STEP = 0.12  # of i_max: change of the current in a period at most
 BIAS_STEP = 0.15  # of i_max: the same for bursts at a bias, whose steepest change the last one has shown
 FASTER = 2.0  # at most, from one bias to the next
@@ -28,7 +28,7 @@ BIAS_SLOWER = 3.5  # the current in d changes more slowly than that in q, and st
 LOST_MAX = 2  # bursts of all that may fail
 TRAVEL = 1.5  # of the time to the bias without saturation
 REVERSALS_D, REVERSALS_Q, REVERSALS_FEW = 6, 5, 3
-MOVES_RAD = 0.004  # electrical: a burst after one that moved the rotor further has few reversals
+MOVES_RAD, SLOW_PERIODS = 0.004, 200  # electrical; after a burst that moved the rotor further and lasted longer: few
 MAGNET = 3.0  # times the guess of the magnet's flux linkage at most
 FIRST = (0.2, 0.9)  # share of its bound at which the first half wave may end
 
@@ -144,8 +144,10 @@ def balanced(
 
 
 def _reversals(last: Raw) -> int:
-    """Of a burst along q. Each half wave lasts, and so does what is left of a mean speed."""
-    return REVERSALS_FEW if last.moved_rad > MOVES_RAD else REVERSALS_Q
+    """Of a burst along q. The longer a burst, the more does a mean speed move the rotor; a short one needs all samples
+    that it can have."""
+    few = last.moved_rad > MOVES_RAD and len(last.i) > SLOW_PERIODS
+    return REVERSALS_FEW if few else REVERSALS_Q
 
 
 def _ladder(drive: Capture, known: Nameplate, losses: Losses, steepest_A: float,
