@@ -29,7 +29,7 @@ DRAWS = [("saturated", 12, 72), ("saturated", 12, 240), ("saturated", 12, 294), 
 DRAW_RMS = 0.005
 # The winding drops 1.2 V at the largest current; a phase current is near zero at every level; large swings.
 LITTLE_VOLTAGE = [("saturated", 126), ("linear", 138), ("hsm1", 105)]
-SWINGS = [("pmasynrm", 107, 2.0), ("hsm1", 110, 2.5), ("hsm1", 120, 6.0)]  # machine, seed, electrical degrees
+SWINGS = [("pmasynrm", 107, 2.0), ("hsm1", 110, 3.0), ("hsm1", 120, 5.0)]  # machine, seed, electrical degrees
 R_LEFT, LEG_V = 0.004, 0.05  # beyond the sensors' gains; 5 mV of 1.2 V; a half per cent of what a leg loses
 
 
