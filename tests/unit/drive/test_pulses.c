@@ -211,3 +211,14 @@ void test_an_axis_that_has_not_begun_gets_the_voltage_of_one_period_at_most_on_t
     TEST_ASSERT_EQUAL_INT(PULSES_MOVED, state.failure);
     TEST_ASSERT_TRUE(largest_q < 401.0);
 }
+
+/* 0.6 of the dc voltage is the largest one: 0.5 and -0.25 of it at half of the voltage base are 0.15 and -0.075. */
+void test_the_voltage_of_the_pulses_is_their_share_of_the_largest_one(void)
+{
+    const current_control_out_t out = pulses_voltage((dq_q15_t){16384, -8192}, Q31(0.6), 16384);
+    TEST_ASSERT_INT32_WITHIN(1, 4915, out.u.d);
+    TEST_ASSERT_INT32_WITHIN(1, -2458, out.u.q);
+    TEST_ASSERT_EQUAL_HEX32(fx_pair(16384, -8192), out.v);
+    TEST_ASSERT_FALSE(out.clear);
+    TEST_ASSERT_EQUAL_UINT32(0, out.limited);
+}
