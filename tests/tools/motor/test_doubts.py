@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Improbable values cause a warning, errors of units are named first, offered values are accepted."""
 
+import dataclasses
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -172,6 +174,16 @@ def test_a_map_with_more_detail_than_the_tables_is_warned_of(write: Write) -> No
     folder = write(flux_map=plane(ID, iq_A, sharp), machine={"torque_max_Nm": 100.0})
     warned = doubts.of_motor(load_motor(folder))
     assert any(text.startswith(("current references: torque", "flux tables: torque")) for text in warned), warned
+
+
+@pytest.mark.parametrize("name", ["hsm1_8kHz", "leaf", "pmasynrm", "truck", "ebike"])
+def test_a_top_speed_in_rad_per_s_is_noticed_in_spite_of_field_weakening(name: str) -> None:
+    loaded = load_motor(TESTED / name)
+    rpm = loaded.config.machine.speed_max_rpm
+    machine = loaded.config.machine.model_copy(update={"speed_max_rpm": rpm * math.pi / 30.0})
+    config = loaded.config.model_copy(update={"machine": machine})
+    warned = doubts.of_motor(dataclasses.replace(loaded, config=config))
+    assert any(f"as rad/s it would be {rpm:.0f} rpm" in text for text in warned), warned
 
 
 def test_the_command_warns_on_the_terminal_and_in_the_report(cli, write: Write, tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 TORQUE_MAX = 3.0  # of torque_max_Nm, at i_max: the accepted machines of the tests have up to 1.3
 EMF_MAX = 60.0  # of what the dc link can balance, by the magnet alone at top speed: field weakening has its limits
-EMF_MIN = 0.2  # by the whole flux at the largest current: a machine so slow needs no such dc link
+EMF_MIN = 0.5  # by the whole flux at the largest current: a machine so slow needs no such dc link
 SALIENCE_MAX = 100.0  # flux of i_max in the q axis over the magnet's
 DROP_MIN = 5e-5  # of vdc, by i_max on the resistance
 DEAD_TIME_MOST = 0.03  # of i_max, in one PWM period by dead time and device drop: beyond it currents near 0 oscillate
@@ -69,7 +69,8 @@ def _units(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
     if used < EMF_MIN:
         rad_s = machine.speed_max_rpm * 60.0 / (2.0 * math.pi)
         yield Doubt(f"machine.speed_max_rpm = {machine.speed_max_rpm:g} rpm: there all flux needs {100 * used:.2g} % "
-                    f"of vdc_V = {config.inverter.vdc_V:g} V; as rad/s it would be {rad_s:.0f} rpm")  # fmt: skip
+                    f"of the phase voltage that vdc_V = {config.inverter.vdc_V:g} V gives; "
+                    f"as rad/s it would be {rad_s:.0f} rpm")  # fmt: skip
 
 
 def _values(config: MotorConfig) -> Iterator[Doubt]:
