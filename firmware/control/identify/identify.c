@@ -81,9 +81,9 @@ static FX_NOT_INLINED uint32_t update(identify_state_t *state, const jacobian_ro
 /* Ends an update's ten steps. The q axis, whose turn is in the next step, takes the d axis into account. */
 static void update_d_axis(identify_state_t *state)
 {
-    identify_measurement_t *mean = &state->mean;
     uint32_t report = 0;
     if (state->kept.update_valid) {
+        identify_measurement_t *mean = &state->mean;
         const int32_t output_before = kalman_output(&state->kalman, &mean->q);
         report = update(state, &mean->d, mean->e.d);
         const int32_t change = fx_sub_q31(kalman_output(&state->kalman, &mean->q), output_before);
@@ -101,9 +101,7 @@ static void update_q_axis(const identify_config_t *config, identify_state_t *sta
     if (state->kept.update_valid) {
         const uint32_t report = update(state, &state->mean.q, state->mean.e.q);
         const bool exceeded = (report | state->gate_exceeded_updates) != 0U || state->kept.clamped; /* either axis */
-        if ((report & KALMAN_CLAMPED) != 0U) {
-            state->kept.clamped = true;
-        }
+        state->kept.clamped |= (report & KALMAN_CLAMPED) != 0U;
         const int32_t share = state->kept.mismatch_share; /* from 0 to 1 */
         const int32_t error = (exceeded ? Q15_MAX : 0) - share;
         state->kept.mismatch_share = fx_add_q15((q15_t)share, fx_mul_q15(config->mismatch_rate, error));
@@ -196,8 +194,6 @@ identify_out_t identify_step(const identify_config_t *config, identify_state_t *
         update_confidence(config, state, &model, out.torque);
     } else if (state->steps >= IDENTIFY_STEPS) {
         update_d_axis(state);
-    } else {
-        /* the other steps only add to the mean */
     }
     identify_seal_kept(state);
     return out;
