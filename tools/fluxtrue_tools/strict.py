@@ -24,6 +24,7 @@ UNITS = {
     "s": "s", "C": "°C", "K": "K", "m": "m", "N": "N", "W": "W",
 }  # fmt: skip
 NOT_A_UNIT = {"observer_m"}
+OF_KEY = {"iron_loss_hysteresis": "W/(rad/s·(V·s)²)", "iron_loss_eddy": "W/((rad/s)²·(V·s)²)"}
 _UNIT = re.compile(rf"_({'|'.join(UNITS)})(?:_[abc])?$")
 
 
@@ -63,9 +64,10 @@ Flag = Annotated[float, BeforeValidator(flag)]
 
 
 def unit_of(key: str) -> str:
-    """The unit that a key ends in, as a reader writes it; empty without one."""
-    found = None if key.rsplit(".", maxsplit=1)[-1] in NOT_A_UNIT else _UNIT.search(key)
-    return UNITS[found[1]] if found else ""
+    """The unit of a key, mostly that in which its name ends, as a reader writes it; empty without one."""
+    name = key.rsplit(".", maxsplit=1)[-1]
+    found = None if name in NOT_A_UNIT else _UNIT.search(key)
+    return OF_KEY.get(name, UNITS[found[1]] if found else "")
 
 
 def down(value: float) -> float:

@@ -22,7 +22,7 @@ BAD = [
     ),
     (
         {"machine": SMALL | {"speed_max_rpm": 2400.0, "iron_loss_eddy": 500.0}, "inverter": SMALL_INVERTER},
-        ["machine.iron_loss_eddy = 500, allowed: up to 2.49"],
+        ["machine.iron_loss_eddy = 500 W/((rad/s)²·(V·s)²), allowed: up to 2.49"],
     ),
     (
         {
@@ -49,6 +49,7 @@ BAD = [
     ({"machine": {"name": '""'}}, ["machine.name", "letters, digits"]),
     ({"machine": {"name": 7}}, ["machine.name = 7"]),
     ({"machine": {"polepairs": 4}}, ["machine.polepairs", "unknown key", "pole_pairs"]),
+    ({"machine": {"iron_loss_hysteresis": 1e9}}, ["iron_loss_hysteresis = 1000000000.0 W/(rad/s·(V·s)²)", "10000"]),
     ({"motor": {"x": 1}}, ["motor", "unknown key", "machine, inverter, control"]),
     ({"control": {"observer_m": 5.0}}, ["control.observer_m = 5.0", "from 2 to 4"]),
     ({"control": {"observer_mm": 3.0}}, ["control.observer_mm", "unknown key"]),
