@@ -7,7 +7,8 @@
  *   torque  p = u.i - r |i|^2 - d psi.i/dt = t w;   dev = p - t* w, first-order mean over 4 ms
  *           too much: sign(t* w) dev > |w| (t_0 + |t*|/8) + (v_0 + |d psi/dt|/2 + r_error |i|) (|i| + i_0) + |l t*|,
  *           or against the request by as much
- *   angle   e = u - r i - j w psi(i), means of the step: e_q shows a magnet too weak or too strong, e_d a wrong angle
+ *   angle   e = u - r i - d psi/dt - j w psi(i), with the mean voltage of the step and the flux in its middle
+ *           e_q shows a magnet that is too weak or too strong, e_d a wrong angle
  *           |e_d| > |w| (psi_f/5 + |psi_q|/8) + |l psi_q| + v,  or e_q sign(w) outside
  *           |w| psi_f (-0.5 ... 0.35) -+ (|l psi_d| + v),
  *           v = v_0/2 + v_noise + r |i| + c/2 + max(c - v_0, 0), c = |d psi/dt|; inactive while |w| psi_f/5 < v_0/2

@@ -9,11 +9,11 @@
 #define PARTS_PER_STEP 4        /* the whole table in 16 steps */
 #define ADVANCE_MIN (1 << 26)   /* 1/64 turn per step: below, the second difference of a harmonic is too small */
 #define ADVANCE_MAX (1 << 30)   /* 1/4 turn per step: above, the second harmonic aliases */
-#define ADVANCE_FAST_SHIFT 28   /* between 1/16 and 1/8 turn per step mu = 1/16, and mu d below 2^26 */
+#define ADVANCE_FAST_SHIFT 28   /* between 1/16 and 1/8 turn per step mu = 1/16; 4 (d - a) stays below 2^29 */
 #define DIFFERENCE_MAX_SHIFT 4  /* 1/16 of the step: a sample one period late deviates by 1/10 of ten periods */
 
-/* cos theta, sin theta, cos 2 theta, sin 2 theta. The low half of the sine still contains the cosine, less than an LSB
- * of it: to clear it would cost a constant. */
+/* cos theta, sin theta, cos 2 theta, sin 2 theta. The low half of the sine's word still contains the cosine, which is
+ * less than an LSB of the 16-bit sine. Clearing it would take a constant more in the flash. */
 static FX_NOT_INLINED void harmonics(uint32_t theta, int32_t q31[ANGLE_HARMONICS])
 {
     for (unsigned n = 0; n < ANGLE_HARMONICS; n += 2U) {
@@ -24,7 +24,8 @@ static FX_NOT_INLINED void harmonics(uint32_t theta, int32_t q31[ANGLE_HARMONICS
     }
 }
 
-/* c += d harmonic/64: the high word of Q32 * Q31 is half of the product in Q32. */
+/* c += d harmonic/64: the high word of Q32 * Q31 is half of the product in Q32. For mu = 1/16
+ * the caller passes 4 d. */
 static void update_coefficients(const angle_harmonics_config_t *config, angle_harmonics_state_t *state, int32_t d)
 {
     int32_t at_q31[ANGLE_HARMONICS];

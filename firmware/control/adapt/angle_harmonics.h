@@ -4,15 +4,15 @@
 /** Adaptive correction of the angle sensor's first and second harmonic error per mechanical turn (LMS algorithm).
  *   d = theta[k] - 2 theta[k-1] + theta[k-2] of the corrected angle: at speed the rotor's inertia keeps the true second
  *     difference close to 0, so that d shows the remaining error of the sensor
- *   a += (d - a)/16: the rotor's acceleration
  *   c_n += mu (d - a) cos(n theta[k-1]),  s_n += mu (d - a) sin(n theta[k-1]),  n = 1, 2;  |c|, |s| <= max
  *   mu = 1/64, but 1/16 between 1/16 and 1/8 turn per step: 3750 and 7500 rpm at 1 ms a step
+ *   then a += (d - a)/16: the rotor's acceleration
  *   table[j] = sum of c_n cos(n t_j) + s_n sin(n t_j), t_j the middle of 64 equal parts of the turn
  * The fast ISR adds table[theta >> 26] to the measured angle.
  * Source   docs/theory/angle-tracker.md (AT-10) ... (AT-13), (AT-20)
  * Units    mechanical angles as fractions of a turn times 2^32
  * Range    every angle; adapts between 1/64 and 1/4 turn per step: 940 and 15 000 rpm at 1 ms a step
- * Rounding 1 LSB in 2^-16 turn of the step, half up
+ * Rounding 1 LSB in 2^-16 turn of the step, half up; a is rounded down to 2^-21 turn
  * Errors   a |d| above 1/16 of the step means a late sample or a faulty sensor: no adaptation in this step
  *          coefficients that the memory has changed are reported
  * Context  1 kHz task; no division. table is read by the fast ISR word by word */
