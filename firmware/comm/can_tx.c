@@ -26,7 +26,8 @@ static const tx_message_t messages[] = {
 
 _Static_assert(MESSAGES <= CAN_TX_MESSAGES_MAX, "each message has space for its counter");
 
-/* Every cycle is a multiple of ten milliseconds: a message can be due in one of ten only. One bit for each message. */
+/* Every cycle is a multiple of ten milliseconds, so a message can be due only in the milliseconds that have the last
+ * digit of its phase. For each digit: one bit for each of its messages, in the order of the list. */
 enum {
 #define NUMBER(name, NAME) NUMBER_##name,
     BUS_SENT(NUMBER)

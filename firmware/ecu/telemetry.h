@@ -11,7 +11,8 @@
 #include "comm/can_tx.h"
 #include "drive/drive.h"
 
-/** tx: what only the messages of identification and temperatures contain is read only if it may send them. */
+/** Fields that only the messages of identification and temperatures contain are left as they are unless tx may send
+ * these messages. */
 void telemetry_read(const drive_t *drive, const can_tx_t *tx, telemetry_t *telemetry);
 
 #endif

@@ -80,7 +80,7 @@ __attribute__((naked)) void fault_handler(void)
     __asm__ volatile("ldr r0, =stack_top\n msr msp, r0\n b panic\n" ::"i"(panic));
 }
 
-/* After a reset at speed the bridge waits for this. */
+/* The long areas by four words at a time: after a reset at speed the bridge waits until this has been done. */
 static void clear_and_copy(void)
 {
     const uint32_t *from = data_load;

@@ -15,7 +15,8 @@ typedef struct {
     unsigned shift;
 } reciprocal_t;
 
-/* x 2^-n, half up, n = 1 ... 31, |x| < 2^62. Each word by itself: a shift of both would allow for n > 31. */
+/* x 2^-n, half up, n = 1 ... 31, |x| < 2^62. Each word is shifted by itself: the compiler's shift of 64 bits takes
+ * longer, because it allows for n > 31. */
 static int32_t round_shift(int64_t x, unsigned n)
 {
     const int64_t rounded = x + (int32_t)(1U << (n - 1U));

@@ -13,7 +13,7 @@
  * Rounding 1/s is rounded down by at most 2^-15, so that P stays positive definite without the Joseph form; states are
  *          rounded half up
  * Errors   a state that reaches its limit is reported; e is limited to 1/16 before it acts
- * Context  1 kHz task, each part in a step of its own of ten; one division per update */
+ * Context  1 kHz task: in ten steps one update of each axis and one prediction; one division per update */
 #include <stdbool.h>
 
 #include "control/identify/model.h"
