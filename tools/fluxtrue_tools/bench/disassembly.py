@@ -18,7 +18,7 @@ _LINE = re.compile(r"^\s*([0-9a-f]+):\t([0-9a-f ]+?)\s*\t(\S+)(?:\t(.*))?$")
 _TARGET = re.compile(r"(?:^|, )([0-9a-f]+) <")
 _REGISTER_RANGE = re.compile(r"([rsd])(\d+)-[rsd](\d+)")
 _WORD = re.compile(r"^\s*([0-9a-f]+):\t[0-9a-f ]+?\s*\t\.word\t0x([0-9a-f]+)")
-FAR, VENEER = ("ldr", "pc, [pc]"), "_veneer"  # the jump in it, and how its name ends
+FAR, VENEER = ("ldr", "pc, [pc]"), "_veneer"  # the jump in a veneer, and the end of its name
 _COPY = re.compile(r"\.(lto_priv|constprop|isra|part|cold)(\.\d+)?")
 
 
@@ -87,7 +87,7 @@ def parse(text: str) -> list[Function]:
 
 
 def _lead(code: list[Instruction], address: int, constant: int) -> None:
-    """The linker's way from flash to RAM and back: ldr pc with the constant behind it, bit 0 set for Thumb code."""
+    """A veneer of the linker, between flash and RAM: ldr pc with the constant behind it, bit 0 set for Thumb code."""
     last = code[-1]
     if (last.bare, last.operands) == FAR and last.address + last.size == address:
         code[-1] = replace(last, far=constant & ~1)

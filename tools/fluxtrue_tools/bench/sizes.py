@@ -76,7 +76,7 @@ def _module(source: str, name: str) -> str:
     return "C library" if path else "constants without a source line"
 
 
-CODE = "tTwW"  # kinds of symbols: what of it lies in the RAM is in the flash, too, from where it is copied
+CODE = "tTwW"  # kinds of symbols; code in the RAM lies in the flash, too, from which it is copied
 NAMED = 64  # bytes: variables from here on are listed by name
 
 
