@@ -77,10 +77,10 @@ void angle_harmonics_step(const angle_harmonics_config_t *config, angle_harmonic
     }
     state->before = state->last;
     state->last = theta;
-    uint32_t part = state->part;
+    uint32_t part = state->part % ANGLE_HARMONICS_PARTS;
     do {
         table[part] = correction(state, part);
         part++;
     } while (part % PARTS_PER_STEP != 0U);
-    state->part = (uint8_t)(part % ANGLE_HARMONICS_PARTS);
+    state->part = (uint8_t)part;
 }

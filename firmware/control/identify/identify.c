@@ -146,7 +146,7 @@ static void update_local_flux_error(const identify_config_t *config, identify_st
         const q16_t gain = in->point->omega / fx_max_s32(square >> 15, 1); /* Q31/Q15 */
         target = (dq_q30_t){fx_mul_gain_q31(gain, e.q), fx_mul_gain_q31(-gain, e.d)};
     }
-    const int32_t twice = 2 * config->local_rate;
+    const int32_t twice = fx_add_q31(config->local_rate, config->local_rate);
     dq_q30_t *local = &state->kept.local;
     local->d = fx_mulhi_add(local->d, twice, fx_sub_q31(target.d, local->d));
     local->q = fx_mulhi_add(local->q, twice, fx_sub_q31(target.q, local->q));

@@ -149,6 +149,22 @@ void test_the_faster_correction_is_damped(void)
 /* Uncorrected samples through (AT-20), (AT-11) and (AT-12) in double precision, at a speed of the larger gain. The
  * fixed point rounds each step by up to 1/2 LSB and sine and cosine to 2^-15: 100 steps of up to 5e5 LSB of d/16 have
  * an error of 16 LSB each. */
+/* The place in the table has no seal: a value that the memory has changed must not lead behind the table. */
+void test_a_damaged_place_stays_in_the_table(void)
+{
+    int32_t around[ANGLE_HARMONICS_PARTS + 256];
+    for (unsigned n = 0; n < sizeof around / sizeof around[0]; n++) {
+        around[n] = 12345;
+    }
+    for (unsigned part = 0; part < 256U; part++) {
+        angle_harmonics_state_t damaged = {.part = (uint8_t)part};
+        angle_harmonics_step(&config, &damaged, 0, around);
+    }
+    for (unsigned n = ANGLE_HARMONICS_PARTS; n < sizeof around / sizeof around[0]; n++) {
+        TEST_ASSERT_EQUAL_INT32(12345, around[n]);
+    }
+}
+
 void test_coefficients_and_table_match_their_equations(void)
 {
     double c[4] = {0}, last = 0.0, before = 0.0, acceleration = 0.0;
