@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from fluxtrue_tools.commission import hidden
-from fluxtrue_tools.commission.bursts import STARTS, Burst, record
-from fluxtrue_tools.commission.drive import SIGNALS, SoftwareInTheLoop
+from fluxtrue_tools.commission import hidden, plan
+from fluxtrue_tools.commission.bursts import FAILURES, STARTS, Burst, Raw, record
+from fluxtrue_tools.commission.drive import SIGNALS, Capture, SoftwareInTheLoop
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
@@ -156,3 +156,27 @@ def test_with_many_pole_pairs_the_rotor_may_move_by_more_electrical_degrees(
     burst = Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=4)
     assert record(hesitant, burst, replace(known, pole_pairs=pole_pairs)).failure == ""
     assert math.degrees(hesitant.allowed_rad) == pytest.approx(degrees)
+
+
+@pytest.mark.parametrize("samples", [1, 3])
+def test_the_next_burst_is_planned_from_the_last_valid_one(
+    drive: SoftwareInTheLoop, known: Nameplate, monkeypatch: pytest.MonkeyPatch, samples: int
+) -> None:
+    """Two bursts of all may fail. What they recorded before is no measure of how fast the current changes."""
+    asked: list[Burst] = []
+
+    def recorded(of: Capture, burst: Burst, plate: Nameplate) -> Raw:
+        raw = record(of, burst, plate)
+        asked.append(burst)
+        if sum(each.v_d > 0.0 and each.v_q > 0.0 for each in asked) != 3:
+            return raw
+        i, u, theta, zero = (values[:samples] for values in (raw.i, raw.u, raw.theta, raw.zero))
+        return replace(raw, i=i, u=u, theta=theta, zero=zero, failure=FAILURES[4])
+
+    losses = plan.Losses(known.r_ohm, 0.0)
+    first = plan.first(drive, known, losses)
+    monkeypatch.setattr(plan, "record", recorded)
+    raws = plan.sweep(drive, first, known, losses)
+    assert [raw.is_valid for raw in raws].count(False) == 1
+    _, second, _, fourth, *_ = (burst for burst in asked if burst.v_d > 0.0 and burst.v_q > 0.0)
+    assert all(0.0 < burst.first <= 1.0 for burst in asked) and fourth.v_q <= 1.5 * second.v_q

@@ -14,7 +14,7 @@ from fluxtrue_tools.motor.flux_model import Array
 
 FAILURES = {1: "refused", 2: "switching was disabled", 3: "the rotor moved", 4: "the current did not reach its bound",
             5: "the current exceeded the machine's largest"}  # fmt: skip
-REFUSED = FAILURES[1]
+REFUSED, MOVED = FAILURES[1], FAILURES[3]
 STARTS = 6  # of one burst
 BRAKE_S, BRAKE_STEPS, STANDING_RPM = 0.005, 60, 0.5
 REST_S = 0.02  # after a burst: the drive controls the currents to zero
@@ -72,6 +72,11 @@ class Raw:
     period_s: float
     axes: tuple[float, float] = (1.0, 1.0)  # weights of psi_d and psi_q
     failure: str = ""
+
+    @property
+    def is_valid(self) -> bool:
+        """Up to its end by a movement of the rotor a burst is valid."""
+        return self.failure in ("", MOVED)
 
     @property
     def moved_rad(self) -> float:

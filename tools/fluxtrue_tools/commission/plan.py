@@ -182,14 +182,16 @@ def sweep(drive: Capture, found: First, known: Nameplate, losses: Losses) -> lis
     v_d = _voltage(BIAS_SLOWER * steep_d, i_max_A)
     per_period = v_d * found.volts * period_s / found.l_d_H
     band, v_q = BAND * i_max_A, float(np.abs(along_q[-1].u.imag).max()) / found.volts
-    centre = 0.0
+    last, centre = along_q[-1], 0.0  # the last burst that is valid, from which the next one is planned
     for bias in BIASES:
-        more_A = -bias * i_max_A - centre
-        centre, delay = -bias * i_max_A, math.ceil(TRAVEL * bias * i_max_A / per_period)
-        top = math.sqrt((LEVELS[-1] * i_max_A) ** 2 - (abs(centre) + band) ** 2)
-        v_q = min(_voltage(_steepest_within(raws[-1], v_q, top), i_max_A, BIAS_STEP), FASTER * v_q)
-        psi_f_Vs = magnet_Vs(raws[len(along_d) :], losses, known.psi_f_Vs)
-        share = balanced(raws[-1], losses, psi_f_Vs, top, more_A, found.l_d_H * more_A)
-        raws.append(record(drive, Burst(v_d, v_q, (centre - band, centre + band), (-top, top), _reversals(raws[-1]),
-                                        delay, share), known))  # fmt: skip
+        target, delay = -bias * i_max_A, math.ceil(TRAVEL * bias * i_max_A / per_period)
+        more_A = target - centre
+        top = math.sqrt((LEVELS[-1] * i_max_A) ** 2 - (abs(target) + band) ** 2)
+        share = min(_voltage(_steepest_within(last, v_q, top), i_max_A, BIAS_STEP), FASTER * v_q)
+        psi_f_Vs = magnet_Vs([raw for raw in raws[len(along_d) :] if raw.is_valid], losses, known.psi_f_Vs)
+        half = balanced(last, losses, psi_f_Vs, top, more_A, found.l_d_H * more_A)
+        raws.append(record(drive, Burst(v_d, share, (target - band, target + band), (-top, top), _reversals(last),
+                                        delay, half), known))  # fmt: skip
+        if raws[-1].is_valid:
+            last, centre, v_q = raws[-1], target, share
     return raws

@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from fluxtrue_tools.commission import balance, bus_turning, connection, drag, levels, plan, spin, surface, turning
 from fluxtrue_tools.commission.balance import Balance
-from fluxtrue_tools.commission.bursts import FAILURES, Raw, offset
+from fluxtrue_tools.commission.bursts import Raw, offset
 from fluxtrue_tools.commission.bus import OverTheBus
 from fluxtrue_tools.commission.connection import Followed
 from fluxtrue_tools.commission.drag import Drag
@@ -24,7 +24,6 @@ from fluxtrue_tools.commission.surface import Surface
 from fluxtrue_tools.errors import FluxtrueError
 
 SETTLE_S = 0.05
-MOVED = FAILURES[3]
 
 
 @dataclass
@@ -154,8 +153,8 @@ def _map(drive: Capture, found: Found, known: Nameplate) -> None:
         found.bursts = plan.sweep(drive, found.first, known, losses)
     finally:
         drive.set("dead_time_compensation", compensated)
-    used = [raw for raw in found.bursts if raw.failure in ("", MOVED)]  # up to its end by a movement a burst is valid
-    lost = [raw.failure for raw in found.bursts if raw.failure not in ("", MOVED)]
+    used = [raw for raw in found.bursts if raw.is_valid]
+    lost = [raw.failure for raw in found.bursts if not raw.is_valid]
     if len(lost) > plan.LOST_MAX:
         raise FluxtrueError(f"commission: map: {len(lost)} of {len(found.bursts)} bursts failed: {lost[0]}")
     found.balance = balance.measure([*found.levels, *used])
