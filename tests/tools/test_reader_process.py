@@ -33,7 +33,9 @@ def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.Fixt
     return "a_reader"
 
 
-@pytest.mark.parametrize("reader", ["return {'a/b': np.arange(3.0), 'text': 'm\\u00b2', 'n': 4}"], indirect=True)
+@pytest.mark.parametrize(
+    "reader", ["print('a word'); return {'a/b': np.arange(3.0), 'text': 'm\\u00b2', 'n': 4}"], indirect=True
+)
 def test_arrays_and_texts_arrive_by_their_names(reader: str, tmp_path: Path) -> None:
     found = arrays_from(reader, tmp_path / "x")
     assert np.array_equal(found["a/b"], [0.0, 1.0, 2.0]) and str(found["text"]) == "m\u00b2" and int(found["n"]) == 4
@@ -42,6 +44,7 @@ def test_arrays_and_texts_arrive_by_their_names(reader: str, tmp_path: Path) -> 
 @pytest.mark.parametrize(("reader", "said"), [
     ("ctypes.string_at(0)", "the reader crashed"),
     ("return {'a': np.ones(1 << 30)}", "MemoryError: "),
+    ("print('hello'); raise OSError('gone')", "OSError: gone"),
     ("HalfMade()", "KeyError: 'table'"),
     ("raise FluxtrueError('no frames')", "no frames"),
     ("raise ValueError('two\\nlines')", "ValueError: two lines"),

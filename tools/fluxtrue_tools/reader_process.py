@@ -58,8 +58,10 @@ def reason(error: Exception) -> str:
 
 def _main(reader: str, path: Path) -> None:
     """The program of the process. It ends at once after a message, before half-made objects print theirs."""
+    arrays, sys.stdout = sys.stdout.buffer, sys.stderr  # a reader that prints would damage the arrays
     try:
-        sys.stdout.buffer.write(answer(import_module(reader).read, path))
+        arrays.write(answer(import_module(reader).read, path))
+        arrays.flush()
     except Exception as error:  # what these readers raise on damaged files is not documented
         print(reason(error), file=sys.stderr, flush=True)
         os._exit(1)

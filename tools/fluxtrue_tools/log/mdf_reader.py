@@ -21,12 +21,11 @@ BESIDE: Final = ("XCP.", "truth.")
 def read(path: Path) -> Arrays:
     """Frames in the order of their times, the attached DBC, and what was recorded beside the frames.
 
-    time_s, ID, IDE, DataLength and DataBytes (frames x 8) of classical frames; start_s, the time of the epoch at 0 s;
-    dbc, dbc_name; beside and unit, the names and units of further signals, with their arrays beside/k and beside_s/k.
+    time_s, ID, IDE, DataLength and DataBytes (frames x 8) of classical frames; dbc, dbc_name; beside and unit, the
+    names and units of further signals, with their arrays beside/k and beside_s/k.
     """
     with MDF(path) as recorded:
-        found = _frames(recorded) | _dbc(recorded) | _beside(recorded)
-        return found | {"start_s": recorded.header.start_time.timestamp()}
+        return _frames(recorded) | _dbc(recorded) | _beside(recorded)
 
 
 def _frames(recorded: MDF) -> Arrays:

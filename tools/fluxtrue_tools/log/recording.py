@@ -3,14 +3,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from fluxtrue_tools.bus.interface import Interface, read_interface
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.foreign import reading
-from fluxtrue_tools.log import mdf_reader
 from fluxtrue_tools.reader_process import arrays_from
+
+READER: Final = "fluxtrue_tools.log.mdf_reader"  # not imported here: it loads asammdf
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class Beside:
 
 @dataclass(frozen=True)
 class Recording:
-    """Classical frames in the order of their times. Times are seconds since start_s, which is one of the epoch."""
+    """Classical frames in the order of their times. Times are seconds since the start of the recording."""
 
     time_s: np.ndarray
     ids: np.ndarray
@@ -33,7 +35,6 @@ class Recording:
     data: np.ndarray  # frames x 8
     interface: Interface  # the attached one, else the standard one
     beside: dict[str, Beside]
-    start_s: float
 
 
 def read_recording(path: Path, named: str = "") -> Recording:
@@ -42,7 +43,7 @@ def read_recording(path: Path, named: str = "") -> Recording:
     if not path.is_file():
         raise FluxtrueError(f"{name}: no such file")
     try:
-        found = arrays_from(mdf_reader.__name__, path)
+        found = arrays_from(READER, path)
     except ValueError as error:
         raise FluxtrueError(f"{name}: not an MDF4 bus log ({error})") from None
     interface = read_interface()
@@ -53,4 +54,4 @@ def read_recording(path: Path, named: str = "") -> Recording:
     names = zip(found["beside"].tolist(), found["unit"].tolist(), strict=True)
     beside = {key: Beside(found[f"beside_s/{k}"], found[f"beside/{k}"], unit) for k, (key, unit) in enumerate(names)}
     return Recording(found["time_s"], found["ID"], found["IDE"] != 0, found["DataLength"], found["DataBytes"],
-                     interface, beside, float(found["start_s"]))  # fmt: skip
+                     interface, beside)  # fmt: skip
