@@ -142,6 +142,8 @@ COUNTS = {
     "SETTLING_PERIODS": "periods of the excitation, whose filter follows the PWM frequency",
     "LAST_BUT_ONE": "steps of an update, whose rates are generated for its true time",
     "ATTEMPTS": "of a save",
+    "PREDICTION_STEP": "the place of a step among those of an update, whose rates are generated for its true time",
+    "SLOTS": "milliseconds of the clock that the frames are sent by",
 }  # fmt: skip
 DEFINE = re.compile(r"^#define (\w+)\s+\(?-?[0-9].*$", re.MULTILINE)
 NAMED = re.compile(r"(_MS|_US|_S|_SAMPLES|_TICKS|_CYCLES|_ROW)$|STEP|PERIODS|CONSECUTIVE|TIME_|_PER_TASK")
