@@ -6,6 +6,7 @@ its leg is uncertain for a period, and all later flux linkages of the burst cont
 """
 
 import numpy as np
+from scipy import linalg
 
 from fluxtrue_tools.commission.bursts import Raw, mean_sign
 from fluxtrue_tools.motor.flux_model import Array
@@ -49,7 +50,9 @@ class Noise:
     def __init__(self, sigma: Array, common: Array) -> None:
         self._used = np.isfinite(sigma)
         self._sigma = sigma[self._used, None]
-        self._along, sizes, _ = np.linalg.svd(common[self._used] / self._sigma, full_matrices=False)
+        # The faster driver gesdd, numpy's only one, does not converge for some finite matrices.
+        relative = common[self._used] / self._sigma
+        self._along, sizes, _ = linalg.svd(relative, full_matrices=False, lapack_driver="gesvd")
         self._less = 1.0 - 1.0 / np.sqrt(1.0 + sizes[:, None] ** 2)
 
     def whitened(self, rows: Array) -> Array:
