@@ -48,8 +48,8 @@ static const uint16_t in_slot[SLOTS] = {
     0U BUS_SENT(IN_0), 0U BUS_SENT(IN_1), 0U BUS_SENT(IN_2), 0U BUS_SENT(IN_3), 0U BUS_SENT(IN_4),
     0U BUS_SENT(IN_5), 0U BUS_SENT(IN_6), 0U BUS_SENT(IN_7), 0U BUS_SENT(IN_8), 0U BUS_SENT(IN_9),
 };
-#define IN_TENS(name, NAME) && BUS_##NAME##_CYCLE_MS % SLOTS == 0U
-_Static_assert(1 BUS_SENT(IN_TENS), "whole tens of milliseconds");
+#define REST(name, NAME) | (BUS_##NAME##_CYCLE_MS % SLOTS)
+_Static_assert((0U BUS_SENT(REST)) == 0U, "whole tens of milliseconds");
 
 void can_tx_begin(can_tx_t *tx, uint32_t passed_ms)
 {
