@@ -375,6 +375,20 @@ void test_a_parameter_at_its_limit_removes_the_confidence(void)
     TEST_ASSERT_FALSE(state.kept.torque_certain);
 }
 
+void test_a_limit_that_the_d_axis_alone_has_reached_counts_as_a_mismatch(void)
+{
+    const dq_q15_t i = {-4000, 8000};
+    run(i, 0.5, nominal, 3000);
+    while (state.steps != 0U) {
+        run(i, 0.5, nominal, 1);
+    }
+    TEST_ASSERT_EQUAL_INT(0, state.kept.mismatch_share);
+    state.kept.clamped = true; /* as the d axis leaves it to the q axis, which follows in the next step */
+    identify_seal_kept(&state);
+    run(i, 0.5, nominal, 1);
+    TEST_ASSERT_GREATER_THAN_INT(0, state.kept.mismatch_share);
+}
+
 /* With nothing identified the standard deviation of the torque is about a tenth of it. This is below a level of one
  * half, except without torque. */
 void test_the_confidence_also_rises_if_the_uncertainty_is_small_relative_to_the_torque(void)

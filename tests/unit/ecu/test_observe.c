@@ -417,6 +417,13 @@ void test_the_first_derating_reason_is_reported_by_its_number_in_the_dbc(void)
     }
 }
 
+/* As a memory error may set it. */
+void test_a_bit_that_no_derating_has_is_reported_as_no_reason(void)
+{
+    ecu.drive.task.derating = (uint16_t)(1U << 15);
+    TEST_ASSERT_EQUAL_UINT32(0, reported_derating_reason());
+}
+
 /* The vehicle allows 60 N·m of driving and 40 N·m of braking torque; the machine has 132 N·m. */
 void test_the_limit_that_a_request_exceeds_is_reported_in_all_four_quadrants(void)
 {
