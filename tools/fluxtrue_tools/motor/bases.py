@@ -57,6 +57,11 @@ def inductance_min(model: FluxModel, i_max_A: float) -> float:
     return float(min(model.psi_d(d, q, nd=1)[inside].min(), model.psi_q(d, q, nq=1)[inside].min()))
 
 
+def inductance_at_rest(model: FluxModel) -> float:
+    """The smaller incremental inductance of the two axes without current."""
+    return min(float(model.psi_d(0.0, 0.0, nd=1)), float(model.psi_q(0.0, 0.0, nq=1)))
+
+
 def _voltage(config: MotorConfig, psi_max_Vs: float, omega_rad_s: float) -> float:
     """1.5 vdc, or more where the machine's flux would not fit psi_b = V_b/omega_b."""
     normal = VOLTAGE_PER_VDC * config.inverter.vdc_V

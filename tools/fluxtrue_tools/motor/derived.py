@@ -5,7 +5,7 @@ import math
 from dataclasses import dataclass
 
 from fluxtrue_tools.motor import identification
-from fluxtrue_tools.motor.bases import Bases
+from fluxtrue_tools.motor.bases import Bases, inductance_at_rest
 from fluxtrue_tools.motor.config import Inverter, MotorConfig
 from fluxtrue_tools.motor.flux_model import FluxModel
 
@@ -194,7 +194,7 @@ def turning_knee_A_per_rad(config: MotorConfig, model: FluxModel) -> float:
     the dead time does not cancel stays below the answer of the law for a field that turns far (MO-12)."""
     inverter = config.inverter
     duty = inverter.dead_time_s * inverter.pwm_hz + inverter.device_drop_V / inverter.vdc_V
-    l_min = min(float(model.psi_d(0.0, 0.0, nd=1)), float(model.psi_q(0.0, 0.0, nq=1)))
+    l_min = inductance_at_rest(model)
     flux_Vs = duty * config.control.dead_time_compensation * inverter.vdc_V / inverter.pwm_hz
     return DELAY_PERIODS * flux_Vs / (TURNING_FEEDBACK * l_min)
 
@@ -259,7 +259,7 @@ def _answer_rate(config: MotorConfig, bases: Bases) -> float:
 
 def _behind_A_per_V(config: MotorConfig, model: FluxModel, bases: Bases) -> float:
     """How far the current is off its reference if the rotational voltage is wrong by 1 V (MN-43)."""
-    l_min = min(float(model.psi_d(0.0, 0.0, nd=1)), float(model.psi_q(0.0, 0.0, nq=1)))
+    l_min = inductance_at_rest(model)
     sigma = _current_control(bases.period_s)["sigma_rad_s"]
     return 1.0 / (l_min * (TURNING_FEEDBACK / bases.period_s if config.is_turning else sigma))
 

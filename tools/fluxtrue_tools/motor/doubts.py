@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fluxtrue_tools.motor.bases import inductance_at_rest
 from fluxtrue_tools.motor.config import MotorConfig
 from fluxtrue_tools.motor.demagnetisation import limit_A
 from fluxtrue_tools.motor.flux_map import FluxMap
@@ -84,13 +85,10 @@ def _values(config: MotorConfig) -> Iterator[Doubt]:
                     f"in {run_up:.3g} s; wanted: kg·m²")  # fmt: skip
 
 
-def _torque(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
+def _torque(motor: "Motor") -> Iterator[Doubt]:
     """A flux linkage in another unit changes the torque by as much."""
-    machine = config.machine
-    angle = np.linspace(np.pi / 2.0, np.pi, 91)
-    i_d, i_q = machine.i_max_A * np.cos(angle), machine.i_max_A * np.sin(angle)
-    torque = 1.5 * machine.pole_pairs * (model.psi_d(i_d, i_q) * i_q - model.psi_q(i_d, i_q) * i_d)
-    share = float(torque.max()) / machine.torque_max_Nm
+    machine = motor.config.machine
+    share = motor.solver.torque_top_Nm / machine.torque_max_Nm
     if share > TORQUE_MAX:
         yield Doubt(f"machine.torque_max_Nm = {machine.torque_max_Nm:g} N·m: i_max_A = {machine.i_max_A:g} A makes "
                     f"{share:.3g} times as much (allowed without a warning: {TORQUE_MAX:g}); is the flux linkage in "
@@ -100,7 +98,7 @@ def _torque(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
 def _dead_time(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
     """Near zero current the compensation acts by the current of 1.5 periods before."""
     inverter, i_max_A = config.inverter, config.machine.i_max_A
-    least_H = min(float(model.psi_d(0.0, 0.0, nd=1)), float(model.psi_q(0.0, 0.0, nq=1)))
+    least_H = inductance_at_rest(model)
     volt = inverter.dead_time_s * inverter.pwm_hz * inverter.vdc_V + inverter.device_drop_V
     moved_A = volt / inverter.pwm_hz / least_H
     if moved_A > DEAD_TIME_MOST * i_max_A:
@@ -214,7 +212,7 @@ def explaining(config: MotorConfig, model: FluxModel) -> Doubt | None:
 def of_motor(motor: "Motor") -> list[str]:
     """Every warning about a motor that is accepted."""
     config = motor.config
-    found = [*_units(config, motor.model), *_values(config), *_torque(config, motor.model),
+    found = [*_units(config, motor.model), *_values(config), *_torque(motor),
              *_dead_time(config, motor.model), *_magnets(config), *_map(config, motor.flux_map, motor.model),
              *_accuracy(motor), *_no_effect(config)]  # fmt: skip
     return [doubt.text for doubt in found]
