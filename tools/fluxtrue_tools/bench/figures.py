@@ -165,7 +165,7 @@ def measure(folder: Path) -> FIGURES:
             "laws": measure_laws(program),
             "task stages": _spreads(measure_task(build_task(folder / "bench"))),
         },
-        "image": {"flash": whole.flash, "RAM": whole.ram, "code in RAM": whole.ram_code,
+        "image": {"flash": whole.size.flash, "RAM": whole.size.ram, "code in RAM": whole.size.ram_code,
                   "stack reserved": whole.stack},
         "modules": {name: list(both) for name, both in sizes.modules(parts.image).items()},
         "control library": sizes.library(parts.image.parent),

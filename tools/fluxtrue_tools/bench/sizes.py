@@ -27,12 +27,10 @@ _SECTION = re.compile(r"^\.(text|rodata|data|bss)(\S*)\s+(\d+)\s")
 
 @dataclass(frozen=True)
 class Whole:
-    """Of the image, in bytes; the stack is part of the RAM, the code in the RAM is not."""
+    """Of the image, in bytes."""
 
-    flash: int
-    ram: int
-    ram_code: int
-    stack: int
+    size: Size
+    stack: int  # part of the RAM
 
 
 def _lines(*command: str) -> list[str]:
@@ -45,8 +43,7 @@ def _lines(*command: str) -> list[str]:
 def whole(elf: Path) -> Whole:
     """Flash and RAM as the linker counts them."""
     image = Image(elf)
-    size = Size.of(image)
-    return Whole(size.flash, size.ram, size.ram_code, image.symbol("stack_top") - image.symbol("stack_bottom"))
+    return Whole(Size.of(image), image.symbol("stack_top") - image.symbol("stack_bottom"))
 
 
 def _module(source: str, name: str) -> str:
@@ -96,9 +93,9 @@ def modules(elf: Path) -> dict[str, tuple[int, int]]:
         else:
             flash[_module(source, name)] += int(size, 16)
     image = whole(elf)
-    flash["literals, padding, vectors"] = image.flash - flash.total()
+    flash["literals, padding, vectors"] = image.size.flash - flash.total()
     ram["stack"] = image.stack
-    ram["padding"] = image.ram - ram.total()
+    ram["padding"] = image.size.ram - ram.total()
     return {name: (flash[name], ram[name]) for name in sorted(flash | ram)}
 
 
