@@ -46,11 +46,12 @@ def read_recording(path: Path, named: str = "") -> Recording:
         found = arrays_from(READER, path)
     except ValueError as error:
         raise FluxtrueError(f"{name}: not an MDF4 bus log ({error})") from None
-    interface = read_interface()
     if "dbc" in found:
         interface = Interface(f"{found['dbc_name']} in {path.name}", str(found["dbc"]))
         with reading(interface.name, "a DBC"):
             interface.database  # noqa: B018, reads it
+    else:
+        interface = read_interface()
     names = zip(found["beside"].tolist(), found["unit"].tolist(), strict=True)
     beside = {key: Beside(found[f"beside_s/{k}"], found[f"beside/{k}"], unit) for k, (key, unit) in enumerate(names)}
     return Recording(found["time_s"], found["ID"], found["IDE"] != 0, found["DataLength"], found["DataBytes"],
