@@ -24,8 +24,7 @@ static FX_NOT_INLINED void harmonics(uint32_t theta, int32_t q31[ANGLE_HARMONICS
     }
 }
 
-/* c += d harmonic/64: the high word of Q32 * Q31 is half of the product in Q32. For mu = 1/16
- * the caller passes 4 d. */
+/* c += d harmonic/64: the high word of Q32 * Q31 is half of the product in Q32. For mu = 1/16 the caller passes 4 d. */
 static void update_coefficients(const angle_harmonics_config_t *config, angle_harmonics_state_t *state, int32_t d)
 {
     int32_t at_q31[ANGLE_HARMONICS];
