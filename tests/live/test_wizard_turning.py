@@ -16,16 +16,20 @@ from progress import polled, until
 from selenium import webdriver
 from selenium.webdriver.common.keys import Keys
 from test_still import WIDTHS, arrive, begin, moved, shown, watch
-from test_wizard import ARRIVALS, BATCHES, FOUND, NAMEPLATE, STEP_S, Bench, begun, downloaded
+from test_wizard import ARRIVALS, BATCHES, FOUND, NAMEPLATE, SPEEDS_RPM, STEP_S, TORQUE_NM, Bench, begun, downloaded
 
+from fluxtrue_tools.campaign.windows import Window
 from fluxtrue_tools.cli import run as command
-from fluxtrue_tools.commission import turning
+from fluxtrue_tools.commission import driven, turning
 from fluxtrue_tools.commission.cli import nameplate_of
+from fluxtrue_tools.commission.turning import Connection
+from fluxtrue_tools.motor.motor import load_motor
 from fluxtrue_tools.sim import motor as motors
 
 SEED = 101
 OFFSET_DEG, PSI_F, INERTIA, DRAG = 0.2, 0.005, 0.03, 0.1  # the bounds of tests/commission/test_bus_turning.py
 SPIN_S = 600.0  # of simulated time, for the longest step
+TORQUE_SHARE = 0.03  # 95 % of the points after a commissioning; here all of a few
 
 
 @pytest.fixture(scope="module")
@@ -157,7 +161,9 @@ def test_inertia_and_drag_are_found(bench: Bench) -> None:
         assert abs(value(torque) / float(truth.drag_Nm(rpm * math.pi / 30.0)) - 1.0) <= DRAG, name
 
 
-def test_the_standing_steps_follow_and_the_folder_names_what_was_measured(bench: Bench, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def folder(bench: Bench, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The motor's folder, downloaded after the standing steps."""
     page = bench.page
     for step in ("resistance", "map"):
         bench.press(step, "do")
@@ -167,8 +173,26 @@ def test_the_standing_steps_follow_and_the_folder_names_what_was_measured(bench:
     polled(lambda: page.text("finish-state") == "finished")
     report = page.text("finish-report")
     assert "connection:" in report and "magnet: psi_f" in report and "inertia:" in report
-    folder = downloaded(bench, tmp_path)
+    return downloaded(bench, tmp_path_factory.mktemp("downloaded"))
+
+
+def test_the_standing_steps_follow_and_the_folder_names_what_was_measured(bench: Bench, folder: Path) -> None:
     assert command(["motor", "check", str(folder)]) == 0
     motor = tomllib.loads((folder / "motor.toml").read_text(encoding="utf-8"))
     assert motor["machine"]["pole_pairs"] == bench.truth.plant["pole_pairs"]
-    assert not [entry for entry in page.browser.get_log("browser") if entry["level"] == "SEVERE"]
+    assert not [entry for entry in bench.page.browser.get_log("browser") if entry["level"] == "SEVERE"]
+
+
+def test_the_built_firmware_makes_40_newton_metres_true(bench: Bench, folder: Path, tmp_path: Path) -> None:
+    """With the folder's tables alone, and the sensor's connection as its cards tell it."""
+    phases, spin = bench.rows("phases"), bench.rows("spin")
+    wiring = Connection(int(phases["Pole pairs"][0]), phases["The angle sensor counts"][0] == "against the field",
+                        math.radians(value(spin["Electrical angle at the sensor's zero"][0])))  # fmt: skip
+    made = driven.built(load_motor(folder), tmp_path)
+    plan = driven.plan_of(made.motor, bench.truth, 0, 60.0, (1, 1))
+    windows = [Window(speed, torque, 0.2) for speed in SPEEDS_RPM for torque in (TORQUE_NM, -TORQUE_NM)]
+    machine = driven.Coupled(bench.truth, bench.flux_map, wiring)
+    rows = machine.rows(made, plan, windows, driven.ALONE, warm_up=False)
+    print({(row["speed_rpm"], row["torque_requested_Nm"]): f"{row['error_percent']:+.2f} %" for row in rows})
+    assert len(rows) == len(windows) and not any(row["fault_word"] for row in rows)
+    assert max(abs(row["torque_Nm"] / row["torque_requested_Nm"] - 1.0) for row in rows) <= TORQUE_SHARE
