@@ -134,6 +134,8 @@ def test_only_the_lines_that_fit_are_run_and_recorded(tmp_path: Path) -> None:
     table.write_text(table.read_text(encoding="utf-8") + "b-" + line, encoding="utf-8")
     assert faults(campaign, "--out", tmp_path / "out", "--record", "--lines", "b-*").returncode == 0
     assert [row.status for row in fmea.read(table)] == [MET, OPEN]
+    assert faults(campaign, "--out", tmp_path / "both", "--lines", "none,b-*,op?n").returncode == 1  # "met" is not true
+    assert len(pd.read_parquet(tmp_path / "both" / "results.parquet")) == 4
     done = faults(campaign, "--out", tmp_path / "none", "--lines", "angle-*")
     assert done.returncode == 2
     assert "--lines angle-*: no line of" in done.stderr

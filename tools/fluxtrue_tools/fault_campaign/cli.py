@@ -20,7 +20,12 @@ _FOLDER = paths.OutputFolder("campaign.json", "results.parquet", "summary.json",
 @click.option("--fresh", is_flag=True, help="Throw away the results that are there.")
 @click.option("--slice", "is_slice", is_flag=True, help="A few points of each line, and where open lines are not met.")
 @click.option("--record", is_flag=True, help="Write status, witness and result of each line into the table.")
-@click.option("--lines", metavar="PATTERN", default="*", help="Only lines whose id fits, for example 'angle-*'.")
+@click.option(
+    "--lines",
+    metavar="PATTERNS",
+    default="*",
+    help="Only lines whose id fits one of them, for example 'angle-*,healthy'.",
+)
 @click.option("--workers", type=click.IntRange(min=1), help="Processes.  [default: a core each]")
 @click.option(
     "--scheduler", type=kinds.Scheduler(), metavar="tcp://HOST:PORT", help="Run on this Dask cluster instead."
@@ -50,7 +55,7 @@ def faults(campaign: Path, out: Path | None, fresh: bool, is_slice: bool, record
         folders.append((folder.name, str(folder.folder)))
     table, rows = plans.read_rows(read, campaign.parent)
     files.reads(table)
-    chosen = tuple(row for row in rows if fnmatchcase(row.id, lines))
+    chosen = tuple(row for row in rows if any(fnmatchcase(row.id, one) for one in lines.split(",")))
     if not chosen:
         raise FluxtrueError(f"--lines {lines}: no line of {table} fits")
     plan = plans.Plan(read, chosen, tuple(folders), is_slice)
