@@ -176,3 +176,20 @@ def test_the_drive_is_as_good_as_the_best_state_with_a_shorted_switch_and_a_wron
     (run,) = pd.read_parquet(tmp_path / "out-wrong" / "results.parquet").to_dict("records")
     assert (run["verdict"], run["reference"]) == (OPEN, "short circuit above")
     assert run["after_Nm"] > 2.0 * run["reference_upper_Nm"]
+
+
+# `hsm1` at its largest speed: the diodes let it brake. A short circuit would brake less, but drivers that block prevent
+# it.
+BLOCKED = 'fmea = "fmea.csv"\nsigns = [1]\npoints = [[1.0, 0.0]]\n[[machine]]\nmotor = "hsm1"\ncurrent_A = 600\n'
+BLOCKS = "b,gate driver,reports a fault,,plant.drivers_block=1,,safe_state,gate|ecu_gate,2,,50,,,,,{status},,,\n"
+
+
+def test_a_state_that_the_fault_makes_impossible_is_no_reference(tmp_path: Path) -> None:
+    (tmp_path / "b.toml").write_text(BLOCKED + "vdc_V = 500\n", encoding="utf-8")
+    (tmp_path / "fmea.csv").write_text(",".join(fmea.COLUMNS) + "\n" + BLOCKS.format(status=PHYSICS), "utf-8")
+    done = faults(tmp_path / "b.toml", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stdout + done.stderr
+    (run,) = pd.read_parquet(tmp_path / "out" / "results.parquet").to_dict("records")
+    assert run["verdict"] == PHYSICS
+    assert run["after_Nm"] > 40.0
+    assert run["reference_lower_Nm"] == run["reference_upper_Nm"] == run["reference_off_Nm"]

@@ -29,7 +29,7 @@ typedef struct {
 double inverter_short_circuit(const plant_params_t *p, const double duty[3], int gates_on);
 
 /** Whether the gates of a period switch: as the controller wants, or by the imposed state of the bridge (PL-31), which
- * also sets the duties. */
+ * also sets the duties. Never while the gate drivers block: no state but the first is possible then. */
 int inverter_gates(const plant_params_t *p, int gates_on, double duty[3]);
 
 /** Sets the legs for one period. */

@@ -89,10 +89,10 @@ int inverter_gates(const plant_params_t *p, int gates_on, double duty[3])
 {
     const int imposed = p->imposed_bridge;
     if (imposed == PLANT_BRIDGE_OBEYS) {
-        return gates_on;
+        return gates_on && !p->drivers_block;
     }
     duty[0] = duty[1] = duty[2] = imposed == PLANT_BRIDGE_UPPER_ON ? 1.0 : 0.0;
-    return imposed != PLANT_BRIDGE_OFF;
+    return imposed != PLANT_BRIDGE_OFF && !p->drivers_block;
 }
 
 void inverter_set(inverter_t *v, const plant_params_t *p, const double duty[3], int gates_on, double vdc_V)

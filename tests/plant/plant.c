@@ -143,7 +143,7 @@ void plant_sample(plant_t *plant, plant_sensors_t *sensors)
 {
     instant_truth(plant, update(plant));
     sensors_sample(&plant->sensors, &plant->params, &plant->truth, sensors);
-    sensors->gate_fault = plant->gate_fault;
+    sensors->gate_fault = plant->gate_fault || plant->params.drivers_block;
 }
 
 static void substep(plant_t *plant, rotation_t *rotor, double vdc_V, double short_circuit_A, double h, energy_t *sum)

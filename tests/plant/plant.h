@@ -26,7 +26,7 @@ typedef struct {
     int32_t theta_count;
     double known_share; /* what the converter reads of a voltage that does not come from its reference; 1: right */
     double t_winding_C;
-    int gate_fault; /* the gate drivers blocked a short circuit in the last period */
+    int gate_fault; /* the gate drivers blocked a short circuit in the last period, or block now (drivers_block) */
 } plant_sensors_t;
 
 typedef struct {
@@ -71,7 +71,7 @@ void plant_sample(plant_t *plant, plant_sensors_t *sensors);
 void plant_switch(plant_t *plant, const plant_switches_t *on);
 
 /** One PWM period; wanted: duties 0..1 (clamped, NaN counts as 0.5). Only the diodes conduct while switching is
- * disabled, while the gates have no supply, and in a period in which the gate drivers block a short circuit. */
+ * disabled, while the gates have no supply, and in a period in which the gate drivers block. */
 void plant_advance(plant_t *plant, const double wanted[3], int gates_on);
 
 const plant_truth_t *plant_truth(const plant_t *plant);

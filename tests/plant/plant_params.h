@@ -44,6 +44,7 @@ typedef struct {
     double short_circuit_A; /* current of a leg with one switch shorted and the other switched on */
     double desaturation_s;  /* time until the gate drivers block and report this current */
     int desaturation_open;  /* the gate drivers neither block nor report it */
+    int drivers_block;      /* the gate drivers hold all six switches off and report it, for a fault of their own */
     int imposed_bridge;     /* PLANT_BRIDGE_..: whatever the controller wants, (PL-31) */
     /* sensors */
     double current_full_scale_A; /* the converter spans -full scale ... +full scale */

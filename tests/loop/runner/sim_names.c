@@ -38,7 +38,7 @@ static const field_t plant_fields[] = {
     REAL(pwm_hz), REAL(dead_time_s), REAL(device_drop_V), REAL(leg_knee_A), FLAG(substeps),
     FLAG(ideal_inverter), REAL(series_d_V), REAL(series_q_V),
     FLAG3(phase_open), SWITCHES(switch_open), SWITCHES(switch_shorted),
-    REAL(short_circuit_A), REAL(desaturation_s), FLAG(desaturation_open), FLAG(imposed_bridge),
+    REAL(short_circuit_A), REAL(desaturation_s), FLAG(desaturation_open), FLAG(drivers_block), FLAG(imposed_bridge),
     REAL(current_full_scale_A), FLAG(adc_bits),
     REAL3(current_gain), REAL3(current_offset_A), REAL(current_noise_A_rms),
     FLAG(current_quantise), FLAG3(current_stuck), FLAG3(current_open), REAL(converter_reference),

@@ -321,6 +321,28 @@ void test_an_imposed_state_of_the_bridge_is_that_of_a_controller_that_wants_it(v
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, cabs(without_supply(PLANT_BRIDGE_OBEYS, other, 1) - wanted[PLANT_BRIDGE_OFF]));
 }
 
+/* A fault of the drivers themselves leaves only the first of the imposed states, and only that one to a controller. */
+void test_gate_drivers_that_block_leave_only_switching_disabled(void)
+{
+    const double other[3] = {0.3, 0.6, 0.8};
+    p.speed_rad_s = 400.0;
+    const double complex off = without_supply(PLANT_BRIDGE_OFF, other, 1);
+    TEST_ASSERT_FALSE(reported());
+    TEST_ASSERT_TRUE(cabs(without_supply(PLANT_BRIDGE_LOWER_ON, other, 1) - off) > 10.0);
+    p.drivers_block = 1;
+    for (int n = PLANT_BRIDGE_OFF; n <= PLANT_BRIDGE_UPPER_ON; n++) {
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, cabs(without_supply(n, other, 1) - off));
+        TEST_ASSERT_TRUE(reported());
+    }
+    plant_destroy(plant);
+    const plant_truth_t *t = start();
+    plant_set_state(plant, -80.0, 60.0, 0.4, 400.0);
+    for (int k = 0; k < 50; k++) {
+        plant_advance(plant, other, 1);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, cabs(t->i_d_A + I * t->i_q_A - off));
+}
+
 /* The board's switches stay as they were when the state was imposed. */
 void test_with_an_imposed_state_of_the_bridge_the_contactor_does_not_move(void)
 {

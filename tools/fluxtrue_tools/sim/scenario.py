@@ -165,6 +165,7 @@ class Plant(Strict):
     short_circuit_A: Positive | None = None
     desaturation_s: NotNegative | None = None
     desaturation_open: bool | None = None
+    drivers_block: bool | None = None
     series_d_V: float | None = None
     series_q_V: float | None = None
     current_full_scale_A: Positive | None = None
