@@ -28,7 +28,7 @@ static gate_fault_in_t gate_fault_inputs(const drive_t *drive, const snapshot_t 
 }
 
 /* The machine feeds more than a quarter of i_max into the dc link: it would be the cause of an over-voltage, and the
- * voltage would rise further while the diodes end the currents (SS-18). */
+ * voltage would rise further while the diodes end the currents (SS-18). After another fault they already do. */
 static bool charges_link(const drive_t *drive, const snapshot_t *snapshot)
 {
     const operating_point_t *point = &snapshot->sample.point;
@@ -96,7 +96,7 @@ safe_t safe_decision_step(drive_t *drive, const snapshot_t *snapshot)
     if (short_circuit) {
         return SAFE_SHORT_CIRCUIT;
     }
-    return on_faults(by_gate, !over_voltage && charges_link(drive, snapshot));
+    return on_faults(by_gate, faults == 0U && charges_link(drive, snapshot));
 }
 
 bool safe_decision_is_upper(const drive_t *drive)
