@@ -10,6 +10,7 @@
 #define TOUCH_SAFE_V 60.0F      /* ISO 6469-3, dc */
 #define SETTLED_BAND Q15(0.01)  /* of V_b */
 #define SETTLED_US 50000U
+#define SLOW_SHARE Q15(0.8)      /* of the lowest dc voltage at which the drive runs */
 #define IDLE_CURRENT Q15(0.02)  /* of I_b: more, with switching disabled, is an offset or a broken sensor */
 
 /* The first reason that applies is transmitted. Rated torque and the reach of voltage and current are not derating. */
@@ -78,7 +79,7 @@ static bool are_sensors_plausible(const drive_t *drive, const sample_t *sample)
  * inverter withstands. A gate fault may need both for longer (safety/gate_fault.h). */
 static bool is_slow(const drive_t *drive)
 {
-    const q15_t least = fx_mul_q15(drive->motor->safe_state.share_open, drive->motor->monitor.v_min);
+    const q15_t least = fx_mul_q15(SLOW_SHARE, drive->motor->monitor.v_min);
     const q15_t line_emf = drive->task.safe_state.line_emf;
     return !drive->task.gate_fault.holds_supply && line_emf < least &&
            si_from_q15(line_emf, drive->motor->bases.voltage_V) < TOUCH_SAFE_V;

@@ -3,9 +3,9 @@
 #define SAFETY_SAFE_STATE_H
 /** Safe state that a fault would need now: active short circuit, or switching disabled.
  *   e = sqrt(3) w max(psi_f, psi_f + dpsi), the line back-EMF's peak at the known speed w
- *   e > 0.9 v_dc: short circuit, because the diodes would otherwise rectify the back-EMF into the battery and brake;
- *   e < 0.8 v_dc: switching disabled; between both levels the last decision holds; without a
- *   valid speed 0.8 v_dc is the only level
+ *   e > share_short v_dc: short circuit, because the diodes could otherwise rectify the back-EMF into the battery and
+ *   brake; e < share_open v_dc: switching disabled; between both levels the last decision holds; without a valid speed
+ *   share_open is the only one
  *   v_dc is the known dc voltage. It rises with the measured one and falls with a time constant of 64 steps. While a
  *   fault is latched or the converters' reference reads wrong, it falls only if a current has flowed for 10 steps
  *   although switching is disabled: a failed sensor reads as an empty dc link does, but only the empty link draws a
@@ -17,7 +17,7 @@
  *   look like a standstill. In the short circuit the measurement counts only if the currents agree with it. They stand
  *   still in the rotor's frame if the angle turns with the rotor, and they vanish at standstill, whatever the angle
  *   says. Without a valid speed the last one holds; with switching disabled it falls after 20,000 steps of the task.
- * Source   docs/theory/safe-state.md (SS-1) ... (SS-7), (SS-19)
+ * Source   docs/theory/safe-state.md (SS-1) ... (SS-7), (SS-19), (SS-25)
  * Units    per unit; speeds are magnitudes
  * Range    every argument; e saturates at 1
  * Rounding 1 LSB q15, well inside the hysteresis

@@ -89,14 +89,14 @@ void proof_slow_is_below_the_dc_link(void)
 {
     motor_t m;
     drive_t drive;
-    ASSUME(m.safe_state.share_open > 0 && IS_MAGNITUDE(m.monitor.v_min));
+    ASSUME(IS_MAGNITUDE(m.monitor.v_min));
     drive.motor = &m;
     drive.task.gate_fault.holds_supply = nondet_bool();
     const q15_t line_emf = drive.task.safe_state.line_emf;
-    /* line_emf < share_open v_min, within the rounding of one product. */
+    /* line_emf < 0.8 v_min, within the rounding of one product. */
     if (is_slow(&drive)) {
         PROVE(!drive.task.gate_fault.holds_supply);
-        PROVE((int32_t)line_emf * 32768 <= (int32_t)m.safe_state.share_open * (q15_t)m.monitor.v_min);
+        PROVE((int32_t)line_emf * 32768 <= Q15(0.8) * (q15_t)m.monitor.v_min);
     }
 }
 

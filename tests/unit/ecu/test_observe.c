@@ -228,10 +228,9 @@ void test_at_a_low_dc_voltage_the_machine_is_slow_below_what_could_charge_the_li
     TEST_ASSERT_TRUE(slow_at(15.9));
     TEST_ASSERT_FALSE(slow_at(16.1));
     low.monitor.v_min = 1000;
-    low.safe_state.share_open = Q15(0.5);
-    ecu.drive.task.safe_state.line_emf = 500;
+    ecu.drive.task.safe_state.line_emf = 800;
     TEST_ASSERT_FALSE(observe()->slow);
-    ecu.drive.task.safe_state.line_emf = 499;
+    ecu.drive.task.safe_state.line_emf = 799;
     TEST_ASSERT_TRUE(observe()->slow);
 }
 

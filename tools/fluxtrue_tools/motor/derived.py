@@ -8,6 +8,7 @@ from fluxtrue_tools.motor import identification
 from fluxtrue_tools.motor.bases import Bases, inductance_at_rest
 from fluxtrue_tools.motor.config import Inverter, MotorConfig
 from fluxtrue_tools.motor.flux_model import FluxModel
+from fluxtrue_tools.motor.rectifier import sustained_share
 
 DELAY_PERIODS = 1.5  # one of computation, a half of the PWM's hold
 CLOSED_LOOP_SHARE = 0.8
@@ -79,7 +80,8 @@ NOISE_SHARE = 0.002  # of a current converter's full scale, rms
 NOISE_CREST = 4.0 * 0.27  # 4 times the rms of a mean of four steps: (MN-35)
 PERIOD_NOISE_CREST = 4.0 / 3.0  # times the rms; hsm1 needs no more than its V_0
 MONITOR_NOISE_SHARE = 0.04  # of i_max: the bridge's zero crossing and noise look like a voltage on no current
-SHARE_SHORT, SHARE_OPEN = 0.9, 0.8  # of v_dc, by the line back-EMF
+SHARE_SHORT_MIN, SHARE_SHORT_MAX = 0.9, 1.0 - 2.0**-15  # of v_dc, by the line back-EMF: (SS-25), as far as Q15 reaches
+SHARE_HYSTERESIS = 0.1
 V_RELEASE_PER_VDC = 1.15
 
 COLD_C = 20.0  # temperature of machine.r_ohm
@@ -390,14 +392,20 @@ def _slow_monitors(config: MotorConfig, model: FluxModel, bases: Bases) -> dict[
     }
 
 
-def _monitors(config: MotorConfig) -> dict[str, float]:
+def _short_circuit_share(model: FluxModel) -> float:
+    """Of the dc voltage, above which a fault shorts the phases (SS-25), to a hundredth."""
+    return min(max(SHARE_SHORT_MIN, round(sustained_share(model), 2)), SHARE_SHORT_MAX)
+
+
+def _monitors(config: MotorConfig, model: FluxModel) -> dict[str, float]:
     inverter = config.inverter
+    share_short = _short_circuit_share(model)
     return {
         "i_trip_A": config.i_trip_A,
         "v_max_V": V_MAX_PER_VDC * inverter.vdc_V,
         "v_min_V": V_MIN_PER_VDC * inverter.vdc_V,
-        "share_short": SHARE_SHORT,
-        "share_open": SHARE_OPEN,
+        "share_short": share_short,
+        "share_open": share_short - SHARE_HYSTERESIS,
         "v_release_V": V_RELEASE_PER_VDC * inverter.vdc_V,
         "sum_max_A": SUM_MAX_PER_FULL_SCALE * inverter.current_full_scale_A,
     }
@@ -440,7 +448,7 @@ def derive(config: MotorConfig, model: FluxModel, bases: Bases) -> Derived:
         **_torque_loop(config, bases.step_s),
         **_voltage_reserve(config, bases.step_s),
         **_torque_limit(config, bases, psi_f),
-        **_monitors(config),
+        **_monitors(config, model),
         **_slow_monitors(config, model, bases),
         identify=identification.derive(config, bases, psi_f),
     )

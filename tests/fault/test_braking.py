@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a machine brakes in each safe state about the level at which one replaces the other, (SS-25)."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fluxtrue_tools.fault_campaign import fmea, spec
+from fluxtrue_tools.fault_campaign.fmea import Point
+from fluxtrue_tools.fault_campaign.oracle import BRIDGE, LOWER, OFF
+from fluxtrue_tools.fault_campaign.run_point import Imposed, run_point
+from fluxtrue_tools.sim.motor import load
+
+CAMPAIGN = spec.read(Path(__file__).with_name("campaign.toml"))
+STRONG = "plant.magnet_scale=1.06"
+HOT = "plant.winding_C=240"
+
+
+def braking_Nm(name: str, share: float, state: str, change: str = "", torque_Nm: float = -40.0) -> float:
+    """Largest torque from 200 ms after the change of state on; the back-EMF is this share of the dc voltage."""
+    motor = load(name)
+    strength = 1.06 if change == STRONG else 1.0
+    per_rpm = math.sqrt(3.0) * motor.psi_f_Vs * strength * motor.plant["pole_pairs"] * math.pi / 30.0
+    rpm = share * motor.plant["vdc_V"] / per_rpm
+    cells = dict.fromkeys(fmea.COLUMNS, "") | {"id": "x", "element": "-", "failure": "-", "injection": change,
+                                               "reaction": "keep", "status": "met"}  # fmt: skip
+    text = ",".join(fmea.COLUMNS) + "\n" + ",".join(cells[column] for column in fmea.COLUMNS) + "\n"
+    (row,) = fmea.parse(text, "t.csv")
+    point = Point(0, 1.0, name, 0.0, 0.0, rpm, torque_Nm)
+    trace = run_point(CAMPAIGN, motor, row, point, Imposed(BRIDGE[state], 0.0))
+    after = (trace.time_ms > 200.0) & (trace.time_ms < 245.0)
+    return float(np.abs(trace["truth.torque_shaft_mean_Nm"][after]).max())
+
+
+def test_a_machine_with_little_saliency_is_not_braked_by_its_diodes_up_to_the_dc_voltage() -> None:
+    assert braking_Nm("paper", 0.99, OFF) < 0.1
+    assert braking_Nm("paper", 0.99, LOWER) > 8.0
+
+
+def test_above_it_the_braking_begins_slowly_and_the_short_circuit_brakes_more() -> None:
+    """Almost at its largest speed, with a hot winding."""
+    assert braking_Nm("paper", 1.04, OFF, HOT) < 1.5
+    assert braking_Nm("paper", 1.04, LOWER, HOT) > 14.0
+
+
+@pytest.mark.parametrize("torque_Nm", [-40.0, 0.0, 40.0])
+def test_a_machine_with_much_saliency_goes_on_generating_only_above_its_level(torque_Nm: float) -> None:
+    assert braking_Nm("hsm1", 0.9, OFF, torque_Nm=torque_Nm) < 1.0
+
+
+def test_above_its_level_the_short_circuit_brakes_less() -> None:
+    """A machine that generates when it is switched off goes on so at 1.06, with the torque that it had."""
+    assert braking_Nm("hsm1", 1.06, OFF) > 40.0
+    assert braking_Nm("hsm1", 1.06, LOWER) < 4.0
