@@ -79,5 +79,7 @@ def test_where_the_short_circuit_is_the_safe_state_although_it_brakes_hard_the_t
 def test_a_machine_that_never_reaches_the_dc_voltage_is_not_shorted_at_speed(write):
     motor = load_motor(write(machine={"speed_max_rpm": 3000.0}))
     assert used_from_rpm(motor) > 3000.0
-    assert "only after a gate-driver fault, or an over-voltage while the machine charges the link" in report_text(motor)
+    text = report_text(motor)
+    assert "only after a gate-driver fault, or an over-voltage while the machine charges the link" in text
+    assert "up to speed_max_rpm the back-EMF stays below 1 vdc_V" in text
     assert np.all(np.diff(short_circuit(motor).speed_rpm) > 0)

@@ -134,7 +134,7 @@ def _short_circuit(motor: Motor) -> Lines:
         lines.append(
             "  safe state         only after a gate-driver fault, or an over-voltage while the machine charges the "
             "link: up to speed_max_rpm the back-EMF stays below "
-            f"{motor.derived.share_short:g} vdc_V"
+            f"{motor.derived.share_short:.3g} vdc_V"
         )
     return lines
 
