@@ -28,6 +28,8 @@ CASES = [
     ("[plant]\nangle_h2_phase = 1", "plant.angle_h2_phase", "[plant]\nangle_h2_phase = 1\nangle_h2_rad = 0.01"),
     ("[plant]\nresolver_pole_pairs = 3", "plant.resolver_pole_pairs",
      "[plant]\nresolver_pole_pairs = 3\nangle_h2_rad = 0.01"),
+    ("[plant]\nangle_length_check = true", "plant.angle_length_check",
+     "[plant]\nangle_length_check = true\nresolver_pole_pairs = 3\nangle_sine_stuck = true"),
     ("[plant]\nrotor_C = 90", "plant.rotor_C", "[plant]\nrotor_C = 90\nmagnet_temp_coeff_per_K = -1e-3"),
     ("[plant]\nmagnet_temp_coeff_per_K = -1e-3", "plant.magnet_temp_coeff_per_K",
      "[plant]\nmagnet_temp_coeff_per_K = -1e-3\n[[event]]\nt = 0.03\nset = { 'plant.rotor_C' = 90 }"),

@@ -4,10 +4,14 @@
 #include "mechanics.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <string.h>
 
 #define KNOWN_SHARE_MAX 5.0 /* a volt, where the reference is five */
 #define TWO_PI 6.28318530717958647693
+#define LENGTH_LEAST 0.79
+#define LENGTH_GREATEST 1.21
+#define WRONG_LENGTHS_OF_A_FAILURE 3
 
 static double clamp(double x, double lo, double hi)
 {
@@ -63,6 +67,32 @@ static double angle_spike(sensors_t *s, const plant_params_t *p)
     return (sample < p->angle_spike_samples) ? p->angle_spike_rad : 0.0;
 }
 
+/* (PL-33): whether the converter of both tracks has failed. */
+static bool is_failure(sensors_t *s, const plant_params_t *p, double sine, double cosine)
+{
+    const double length = hypot(sine, cosine);
+    const bool is_wrong = p->angle_length_check && (length < LENGTH_LEAST || length > LENGTH_GREATEST);
+    s->wrong_lengths = is_wrong ? s->wrong_lengths + (s->wrong_lengths < WRONG_LENGTHS_OF_A_FAILURE) : 0;
+    return s->wrong_lengths >= WRONG_LENGTHS_OF_A_FAILURE;
+}
+
+/* (PL-32): the angle that the tracks of the resolver show, in the turn of the resolver in which it truly is. */
+static double from_tracks(sensors_t *s, const plant_params_t *p, double theta_rad)
+{
+    const double resolver_rad = p->resolver_pole_pairs * theta_rad;
+    s->sine_rad = p->angle_sine_stuck ? s->sine_rad : resolver_rad;
+    s->cosine_rad = p->angle_cosine_stuck ? s->cosine_rad : resolver_rad;
+    if (!p->angle_sine_stuck && !p->angle_cosine_stuck) {
+        s->wrong_lengths = 0;
+        return theta_rad;
+    }
+    const double sine = sin(s->sine_rad), cosine = cos(s->cosine_rad);
+    if (is_failure(s, p, sine, cosine)) {
+        return NAN;
+    }
+    return theta_rad + remainder(atan2(sine, cosine) - resolver_rad, TWO_PI) / p->resolver_pole_pairs;
+}
+
 /* (PL-18), (PL-19) */
 static void sample_angle(sensors_t *s, const plant_params_t *p, const plant_truth_t *truth)
 {
@@ -75,7 +105,12 @@ static void sample_angle(sensors_t *s, const plant_params_t *p, const plant_trut
     if (p->angle_h2_rad != 0.0) {
         error += p->angle_h2_rad * sin(2.0 * resolver_rad + p->angle_h2_phase);
     }
-    const double measured = wrap_angle(sign * theta + error / p->pole_pairs);
+    const double shown = from_tracks(s, p, sign * theta + error / p->pole_pairs);
+    if (isnan(shown)) {
+        s->theta_m_rad = shown; /* the count has no such value and stays */
+        return;
+    }
+    const double measured = wrap_angle(shown);
     if (p->angle_bits > 0) {
         const double codes = ldexp(1.0, p->angle_bits);
         const double whole = fmod(floor(measured / TWO_PI * codes + 0.5), codes);

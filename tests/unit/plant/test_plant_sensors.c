@@ -319,6 +319,69 @@ void test_a_stuck_sensor_repeats_its_last_sample(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, seen.theta_m_rad);
 }
 
+/* Resolver of two turns per mechanical one: its sine is kept at that of 0.2 rad. */
+void test_a_stuck_track_shows_the_angle_of_its_last_value(void)
+{
+    p.resolver_pole_pairs = 2.0;
+    start();
+    plant_set_state(plant, 0.0, 0.0, 0.1, 0.0);
+    plant_sample(plant, &seen);
+    plant_params(plant)->angle_sine_stuck = 1;
+    for (double theta = 0.1; theta < 6.2; theta += 0.5) {
+        plant_set_state(plant, 0.0, 0.0, theta, 0.0);
+        plant_sample(plant, &seen);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0,
+                                  remainder(2.0 * seen.theta_m_rad - atan2(sin(0.2), cos(2.0 * theta)), TWO_PI));
+        TEST_ASSERT_TRUE(fabs(remainder(seen.theta_m_rad - theta, TWO_PI)) <= 0.25 * TWO_PI);
+    }
+    plant_params(plant)->angle_sine_stuck = 0;
+    plant_params(plant)->angle_cosine_stuck = 1;
+    plant_sample(plant, &seen);
+    const double kept = cos(2.0 * 6.1);
+    plant_set_state(plant, 0.0, 0.0, 1.0, 0.0);
+    plant_sample(plant, &seen);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, remainder(2.0 * seen.theta_m_rad - atan2(sin(2.0), kept), TWO_PI));
+    plant_params(plant)->angle_cosine_stuck = 0;
+    plant_sample(plant, &seen);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, seen.theta_m_rad);
+}
+
+static double shown_at(double theta)
+{
+    plant_set_state(plant, 0.0, 0.0, theta, 0.0);
+    plant_sample(plant, &seen);
+    return seen.theta_m_rad;
+}
+
+/* Length with a sine of 0: |cos|, right up to 0.65 rad. */
+void test_a_checked_converter_shows_no_angle_after_three_wrong_lengths(void)
+{
+    p.angle_length_check = 1;
+    start();
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, shown_at(0.0));
+    plant_params(plant)->angle_sine_stuck = 1;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, shown_at(0.65));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, shown_at(0.67));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, shown_at(1.0));
+    TEST_ASSERT_TRUE(isnan(shown_at(1.0)));
+    TEST_ASSERT_TRUE(isnan(shown_at(1.0)));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, shown_at(0.1));
+    plant_params(plant)->angle_sine_stuck = 0;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, shown_at(1.0));
+}
+
+void test_a_checked_converter_sees_a_length_that_is_too_large(void)
+{
+    p.angle_length_check = 1;
+    start();
+    (void)shown_at(0.25 * TWO_PI);
+    plant_params(plant)->angle_sine_stuck = 1;
+    (void)shown_at(0.8); /* 1.22 */
+    (void)shown_at(0.8);
+    TEST_ASSERT_TRUE(isnan(shown_at(0.8)));
+    TEST_ASSERT_FALSE(isnan(shown_at(0.84))); /* 1.20 */
+}
+
 /* The first two of five samples; after the spikes were switched off, the sequence starts again. */
 void test_spikes_disturb_the_first_samples_of_each_sequence(void)
 {

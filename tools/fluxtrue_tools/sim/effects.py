@@ -17,6 +17,7 @@ ROBUST_ONLY = ("trim",)
 MAP_INSTEAD = ("ld_H", "lq_H", "psi_f_Vs")
 ONLY_WITH_MAP = ("cross_saturation_scale",)
 SPIKE = ("angle_spike_every", "angle_spike_samples", "angle_spike_rad")
+TRACKS = ("angle_sine_stuck", "angle_cosine_stuck")
 OF_A_SHORTED_SWITCH = ("short_circuit_A", "desaturation_s", "desaturation_open")
 ONLY_WHILE = {"current_mode": ("id_ref_A", "iq_ref_A"), "pulses": ("pulses_",)}  # beginnings of names
 AT_START = {"plant.seed": "seed", "plant.theta_m_rad": "plant.theta_m_rad"}
@@ -81,7 +82,10 @@ def _sensors(plant: _Plant) -> Iterator[Found]:
     silent = [k for k in (1, 2) if plant.always(f"angle_h{k}_rad", 0.0)]
     for k in silent:
         yield f"plant.angle_h{k}_phase", f"plant.angle_h{k}_rad is 0"
-    if len(silent) == 2:
+    tracks_move = all(plant.always(name, False) for name in TRACKS)
+    if tracks_move:
+        yield "plant.angle_length_check", " and ".join(f"plant.{name}" for name in TRACKS) + " are false"
+    if len(silent) == 2 and tracks_move:
         yield "plant.resolver_pole_pairs", "plant.angle_h1_rad and plant.angle_h2_rad are 0"
     for zero in (name for name in SPIKE if plant.always(name, 0)):
         for name in SPIKE:

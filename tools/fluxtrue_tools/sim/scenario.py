@@ -192,6 +192,9 @@ class Plant(Strict):
     angle_bits: Annotated[int, Field(ge=0, le=24)] | None = None
     angle_delay_s: NotNegative | None = None
     angle_stuck: bool | None = None
+    angle_sine_stuck: bool | None = None
+    angle_cosine_stuck: bool | None = None
+    angle_length_check: bool | None = None
     angle_spike_every: Annotated[int, Field(ge=0)] | None = None
     angle_spike_samples: Annotated[int, Field(ge=0)] | None = None
     angle_spike_rad: Number | None = None
