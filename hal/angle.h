@@ -5,7 +5,8 @@
  * Source   docs/howto/port.md
  * Units    fraction of a mechanical turn, 2^32 = one turn; wraps
  * Range    every angle
- * Errors   none here; implausible steps are found by the angle tracker
+ * Errors   none here: the port passes a failure that the sensor reports to drive_raise_fault(); implausible steps are
+ *          found by the angle tracker
  * Context  hal_angle_read(): fast ISR, once per period; hal_angle_is_absolute(): 1 kHz task */
 #include <stdbool.h>
 #include <stdint.h>
