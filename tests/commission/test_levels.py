@@ -195,3 +195,27 @@ def test_the_magnet_is_what_it_moves() -> None:
     raws = [burst(i_d, (140.0, -200.0, 200.0), 60.0) for i_d in (0.0, -50.0, -120.0)]
     assert plan.magnet_Vs(raws, NO_LOSSES, 2.0 * PSI_F) == pytest.approx(PSI_F, rel=0.02)
     assert plan.magnet_Vs(raws, NO_LOSSES, 10.0 * PSI_F) == pytest.approx(10.0 / plan.MAGNET * PSI_F)
+
+
+I_MAX, OFF, LAST = 250.0, 50.0, 0.17  # A: the largest current, that along d of the next burst; change in the last one
+
+
+@pytest.mark.parametrize(
+    ("times", "change"), [(0.0, 0.15), (0.5, 0.15), (1.0, LAST), (1.2, 0.17 * 1.2**0.5), (9.0, 0.2)]
+)
+def test_a_movement_makes_the_next_burst_faster(times: float, change: float) -> None:
+    """With the root of the movement, between two changes of the current in a period; a faster one has less current."""
+    share = 0.3
+    i_q = LAST * I_MAX * np.array([0.0, 1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 0.0])
+    theta = np.linspace(0.0, times * plan.MOVED_RAD, len(i_q))
+    last = Raw(1j * i_q, np.zeros(len(i_q)), theta, np.zeros(len(i_q)), PERIOD_S)
+    following, top_A = plan.at_bias(last, share, OFF, I_MAX)
+    assert following == pytest.approx(share * change / LAST)
+    reach = 0.93 - 0.5 * (change - 0.15)
+    assert math.hypot(top_A, OFF) == pytest.approx(reach * I_MAX)
+
+
+def test_a_burst_at_a_bias_is_at_most_twice_as_fast_as_the_last_one() -> None:
+    i_q = 0.01 * I_MAX * np.array([0.0, 1.0, 2.0, 1.0, 0.0])
+    last = Raw(1j * i_q, np.zeros(5), np.linspace(0.0, 0.1, 5), np.zeros(5), PERIOD_S)
+    assert plan.at_bias(last, 0.2, OFF, I_MAX)[0] == pytest.approx(2.0 * 0.2)

@@ -178,5 +178,7 @@ def test_the_next_burst_is_planned_from_the_last_valid_one(
     monkeypatch.setattr(plan, "record", recorded)
     raws = plan.sweep(drive, first, known, losses)
     assert [raw.is_valid for raw in raws].count(False) == 1
-    _, second, _, fourth, *_ = (burst for burst in asked if burst.v_d > 0.0 and burst.v_q > 0.0)
+    at_bias = [burst for burst in asked if burst.v_d > 0.0 and burst.v_q > 0.0]
+    assert [burst.d for burst in at_bias[::2]] == [burst.d for burst in at_bias[1::2]]
+    _, second, _, fourth, *_ = at_bias
     assert all(0.0 < burst.first <= 1.0 for burst in asked) and fourth.v_q <= 1.5 * second.v_q

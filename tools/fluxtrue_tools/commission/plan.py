@@ -16,19 +16,21 @@ from fluxtrue_tools.motor.flux_model import Array
 FIRST_VOLTAGE = 0.15  # with the smallest inductance that is allowed for, 0.2 of i_max in a period
 FIRST_CURRENT = 0.1  # of i_max
 VOLTAGES = (0.12, 0.55)
-STEP = 0.12  # of i_max: change of the current in a period at most
-BIAS_STEP = 0.15  # of i_max: the same for bursts at a bias, whose steepest change the last one has shown
+STEP_D, STEP_Q = 0.12, 0.13  # of i_max: change of the current in a period at most
+BIAS_STEPS = (0.15, 0.2)  # of i_max: the same at a bias, where the last burst has shown the steepest change
+MISSED = 0.5  # of what the change is larger than the first of the two: by so much less is the bound
+BAND_STEP = 0.04  # of i_max: change of the current along d in a period at a bias, so that it stays in its band
 FASTER = 2.0  # at most, from one bias to the next
 GROWTH = 1.3  # of the steepest change, from one level to the next
 LEVELS = (0.35, 0.65, 0.93)  # of i_max
 TOP_D = 0.1  # of i_max: the magnetising side
 BAND = 0.05  # of i_max: half the width of the bias
 BIASES = (0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.85)  # of -i_max
-BIAS_SLOWER = 3.5  # the current in d changes more slowly than that in q, and stays in its band
+BURSTS = 2  # at each of them: a short one moves the rotor less than a long one with as many samples
 LOST_MAX = 2  # bursts of all that may fail
 TRAVEL = 1.5  # of the time to the bias without saturation
-REVERSALS_D, REVERSALS_Q, REVERSALS_FEW = 6, 5, 3
-MOVES_RAD, SLOW_PERIODS = 0.004, 200  # electrical; after a burst that moved the rotor further and lasted longer: few
+REVERSALS_D, REVERSALS_Q = 4, 3
+MOVED_RAD = 0.004  # electrical: by which a burst at a bias may move the rotor without a higher voltage for the next
 MAGNET = 3.0  # times the guess of the magnet's flux linkage at most
 FIRST = (0.2, 0.9)  # share of its bound at which the first half wave may end
 
@@ -74,7 +76,7 @@ def first(drive: Capture, known: Nameplate, losses: Losses) -> First:
     return First(_inductance(along_d, losses, of_q=False), _inductance(along_q, losses, of_q=True), volts)
 
 
-def _voltage(steepest_A: float, i_max_A: float, step: float = STEP) -> float:
+def _voltage(steepest_A: float, i_max_A: float, step: float) -> float:
     """The share at which the current changes by a step in a period; steepest_A: its change with a share of 1."""
     return float(np.clip(step * i_max_A / steepest_A, *VOLTAGES))
 
@@ -143,25 +145,34 @@ def balanced(
     return float(np.clip(np.interp(half, impulse, reached) / min(top_A, float(reached[-1])), *FIRST))
 
 
-def _reversals(last: Raw) -> int:
-    """Of a burst along q. The longer a burst, the more does a mean speed move the rotor; a short one needs all samples
-    that it can have."""
-    few = last.moved_rad > MOVES_RAD and len(last.i) > SLOW_PERIODS
-    return REVERSALS_FEW if few else REVERSALS_Q
+def at_bias(last: Raw, share: float, off_A: float, i_max_A: float) -> tuple[float, float]:
+    """Voltage and bound of the next burst along q. The movement falls with the square of the voltage (CM-28); a higher
+    one than needed leaves fewer samples, and the current misses its bound by more.
+
+    share   of the last burst
+    off_A   the largest current along d
+    """
+    reach_A = LEVELS[-1] * i_max_A
+    steepest_A = _steepest_within(last, share, math.sqrt(reach_A**2 - off_A**2))
+    low, high = (_voltage(steepest_A, i_max_A, step) for step in BIAS_STEPS)
+    wanted = share * math.sqrt(last.moved_rad / MOVED_RAD)
+    following = min(max(wanted, low), high, FASTER * share)
+    reach_A -= MISSED * max(following * steepest_A - BIAS_STEPS[0] * i_max_A, 0.0)
+    return following, math.sqrt(reach_A**2 - off_A**2)
 
 
 def _ladder(drive: Capture, known: Nameplate, losses: Losses, steepest_A: float,
-            of_q: bool) -> tuple[list[Raw], float]:  # fmt: skip
+            of_q: bool) -> list[Raw]:  # fmt: skip
     """Larger and larger currents along one axis: each level's steepest change limits the voltage of the next."""
     raws: list[Raw] = []
     i_max_A = known.i_max_A
     for level in LEVELS:
         top = level * i_max_A
-        share = _voltage(GROWTH * steepest_A, i_max_A)
+        share = _voltage(GROWTH * steepest_A, i_max_A, STEP_Q if of_q else STEP_D)
         free = (-top, top)
         if of_q:
-            half = balanced(raws[-1], losses, known.psi_f_Vs, top) if raws else Burst.first
-            burst = Burst(0.0, share, free, free, _reversals(raws[-1]) if raws else REVERSALS_Q, first=half)
+            half = balanced(raws[-1], losses, magnet_Vs(raws, losses, known.psi_f_Vs), top) if raws else Burst.first
+            burst = Burst(0.0, share, free, free, REVERSALS_Q, first=half)
         else:
             burst = Burst(share, 0.0, (-top, TOP_D * i_max_A), free, REVERSALS_D)
         raws.append(record(drive, burst, known))
@@ -170,28 +181,27 @@ def _ladder(drive: Capture, known: Nameplate, losses: Losses, steepest_A: float,
                 f"commission: pulses along {'q' if of_q else 'd'} up to {top:.3g} A: {raws[-1].failure}"
             )
         steepest_A = max(_steepest(raws[-1], share, of_q), steepest_A)
-    return raws, steepest_A
+    return raws
 
 
 def sweep(drive: Capture, found: First, known: Nameplate, losses: Losses) -> list[Raw]:
     """d alone, q alone, then q at each bias of d."""
     period_s, i_max_A = drive.period_s, known.i_max_A
-    along_d, steep_d = _ladder(drive, known, losses, found.volts * period_s / found.l_d_H, of_q=False)
-    along_q, _ = _ladder(drive, known, losses, found.volts * period_s / found.l_q_H, of_q=True)
+    along_d = _ladder(drive, known, losses, found.volts * period_s / found.l_d_H, of_q=False)
+    along_q = _ladder(drive, known, losses, found.volts * period_s / found.l_q_H, of_q=True)
     raws = [*along_d, *along_q]
-    v_d = _voltage(BIAS_SLOWER * steep_d, i_max_A)
-    per_period = v_d * found.volts * period_s / found.l_d_H
+    steep_d = found.volts * period_s / found.l_d_H
+    v_d = _voltage(steep_d, i_max_A, BAND_STEP)
     band, v_q = BAND * i_max_A, float(np.abs(along_q[-1].u.imag).max()) / found.volts
     last, centre = along_q[-1], 0.0  # the last burst that is valid, from which the next one is planned
-    for bias in BIASES:
-        target, delay = -bias * i_max_A, math.ceil(TRAVEL * bias * i_max_A / per_period)
+    for bias in np.repeat(BIASES, BURSTS):
+        target, delay = -bias * i_max_A, math.ceil(TRAVEL * bias * i_max_A / (v_d * steep_d))
         more_A = target - centre
-        top = math.sqrt((LEVELS[-1] * i_max_A) ** 2 - (abs(target) + band) ** 2)
-        share = min(_voltage(_steepest_within(last, v_q, top), i_max_A, BIAS_STEP), FASTER * v_q)
+        share, top = at_bias(last, v_q, abs(target) + band, i_max_A)
         psi_f_Vs = magnet_Vs([raw for raw in raws[len(along_d) :] if raw.is_valid], losses, known.psi_f_Vs)
         half = balanced(last, losses, psi_f_Vs, top, more_A, found.l_d_H * more_A)
-        raws.append(record(drive, Burst(v_d, share, (target - band, target + band), (-top, top), _reversals(last),
-                                        delay, half), known))  # fmt: skip
+        raws.append(record(drive, Burst(v_d, share, (target - band, target + band), (-top, top), REVERSALS_Q, delay,
+                                        half), known))  # fmt: skip
         if raws[-1].is_valid:
             last, centre, v_q = raws[-1], target, share
     return raws
