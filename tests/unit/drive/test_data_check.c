@@ -107,6 +107,26 @@ void test_a_change_on_purpose_is_no_damage_and_hides_none(void)
     expect_fault_within(DATA_CHECK_ROUND_MAX);
 }
 
+/* So that its time is bounded. The fifth word is damaged. */
+void test_a_step_compares_four_words(void)
+{
+    drive.data_check.at = 0;
+    flip(LIVE_FIRST + 4U * sizeof(uint32_t), 0);
+    TEST_ASSERT_EQUAL_HEX32(0, data_check_step(&drive));
+    TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, data_check_step(&drive));
+}
+
+void test_a_change_of_the_trim_hides_no_damage_of_other_parameters_or_of_the_word_behind_them(void)
+{
+    const size_t damaged[] = {offsetof(drive_t, parameters.torque_slew), offsetof(drive_t, mrai_parameters)};
+    for (unsigned k = 0; k < sizeof damaged / sizeof damaged[0]; k++) {
+        setUp();
+        flip(damaged[k], 0);
+        drive_restore_trim(&drive, 20);
+        expect_fault_within(DATA_CHECK_ROUND_MAX);
+    }
+}
+
 void test_the_pointer_to_the_motor_data_is_restored_by_the_majority(void)
 {
     const motor_t *const before = drive.motor;
