@@ -87,6 +87,9 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     X(CURRENT_SUM_LEVEL, m.monitor.zero_sequence_max = INT32_MAX; m.monitor.sum_max = INT32_MAX) \
     X(NORMAL_CURRENT_LEVEL, m.monitor.i_normal_squared_q30 = m.monitor.i_trip * m.monitor.i_trip) \
     X(NORMAL_CURRENT_LEVEL, m.monitor.i_normal_squared_q30 = -1) \
+    X(NORMAL_CURRENT_LEVEL, m.monitor.i_trip = m.monitor.zero_sequence_max + 11; m.monitor.i_normal_squared_q30 = 101) \
+    X(NORMAL_CURRENT_LEVEL, m.monitor.i_trip = m.monitor.zero_sequence_max; m.monitor.i_normal_squared_q30 = 1) \
+    X(NORMAL_CURRENT_LEVEL, m.monitor.i_trip = 1) \
     X(NORMAL_CURRENT_LEVEL, m.monitor.zero_sequence_max = m.monitor.i_trip; m.monitor.sum_max = 3 * m.monitor.i_trip) \
     X(SAFE_STATE_FLUX, m.safe_state.psi_f = 0) \
     X(SAFE_STATE_LEVELS, m.safe_state.share_open = m.safe_state.share_short)

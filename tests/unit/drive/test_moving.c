@@ -180,16 +180,18 @@ void test_pulses_need_a_connection_without_currents(void)
     TEST_ASSERT_EQUAL_HEX32(0xC0000000U, sample()->theta_e);
 }
 
-/* Three electrical turns for each of the sensor, whatever the motor data say; one LSB for the ratio's rounding. */
+/* Five electrical turns for each of the sensor, whatever the motor data say; one LSB for the ratio's rounding. */
 void test_angle_advance_and_speed_of_the_control_are_those_of_the_connection(void)
 {
     const int32_t pole_pairs = (int32_t)motor.angle_tracker.pole_pairs;
     const command_t command = {.run = BRIDGE_MOVED};
     sample_t now = {.theta_m = 0x10000000U, .point = {.omega = 100000 * pole_pairs}};
+    TEST_ASSERT_NOT_EQUAL(5, pole_pairs);
+    wanted->pole_pairs = 5;
     run();
-    TEST_ASSERT_INT32_WITHIN(1, 3000, drive_take_frame(&drive, &command, &now, 1000 * pole_pairs));
-    TEST_ASSERT_EQUAL_HEX32(0x30000000U, now.theta_e);
-    TEST_ASSERT_INT32_WITHIN(1, 300000, now.point.omega);
+    TEST_ASSERT_INT32_WITHIN(1, 5000, drive_take_frame(&drive, &command, &now, 1000 * pole_pairs));
+    TEST_ASSERT_EQUAL_HEX32(0x50000000U, now.theta_e);
+    TEST_ASSERT_INT32_WITHIN(1, 500000, now.point.omega);
     TEST_ASSERT_EQUAL_INT32(100000 * pole_pairs, drive.frame_angle.omega_sensor);
 }
 
