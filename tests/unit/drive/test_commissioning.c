@@ -168,6 +168,55 @@ void test_a_constant_error_is_added_to_the_compensation(void)
     TEST_ASSERT_EQUAL_INT32(1, drive.task.compensation.measured);
 }
 
+/* The window of the step in which it starts is older than its first current. */
+void test_the_step_in_which_it_starts_does_not_count(void)
+{
+    ask();
+    TEST_ASSERT_EQUAL_UINT16(0, commission->steps);
+    drive_commission(&drive, &snapshot);
+    TEST_ASSERT_EQUAL_UINT16(1, commission->steps);
+}
+
+void test_currents_and_voltages_of_the_window_are_measured(void)
+{
+    measured(1.0, 0.004);
+    commission->steps = 0;
+    commission->sum_i = 1000;
+    commission->sum_u = 2000;
+    drive_commission(&drive, &snapshot);
+    TEST_ASSERT_EQUAL_INT32(1000 + snapshot.window.sum_i.d, commission->sum_i);
+    TEST_ASSERT_EQUAL_INT32(2000 + snapshot.window.sum_u.d, commission->sum_u);
+}
+
+/* At 30 degrees sqrt(3)/2, sqrt(3)/2 and 0; some LSB for sine and transform. */
+void test_the_cosines_are_those_of_the_measured_angle(void)
+{
+    measured(1.0, 0.004);
+    snapshot.sample.theta_e = 0x15555555U;
+    drive_commission(&drive, &snapshot);
+    TEST_ASSERT_INT_WITHIN(8, 28378, commission->data.cosine[0]);
+    TEST_ASSERT_INT_WITHIN(8, 28378, commission->data.cosine[1]);
+    TEST_ASSERT_INT_WITHIN(8, 0, commission->data.cosine[2]);
+}
+
+static void fails_by(commission_failure_t failure)
+{
+    drive_commission(&drive, &snapshot);
+    TEST_ASSERT_EQUAL_INT(COMMISSION_FAILED, commission->phase);
+    TEST_ASSERT_EQUAL_INT(failure, commission->failure);
+    setUp();
+}
+
+void test_a_rotor_that_turns_and_a_limited_voltage_end_it(void)
+{
+    measured(1.0, 0.004);
+    snapshot.sample.point.omega = -motor.commission.omega_max - 1;
+    fails_by(COMMISSION_MOVED);
+    measured(1.0, 0.004);
+    snapshot.window.limited = 1;
+    fails_by(COMMISSION_LIMITED);
+}
+
 void test_without_an_end_of_the_measurement_nothing_changes(void)
 {
     const int before = dead_time();
@@ -175,6 +224,7 @@ void test_without_an_end_of_the_measurement_nothing_changes(void)
     TEST_ASSERT_EQUAL_INT(COMMISSION_IDLE, commission->phase);
     commission->phase = COMMISSION_DONE; /* of the commissioning before */
     drive_commission(&drive, &snapshot);
+    TEST_ASSERT_EQUAL_INT(COMMISSION_DONE, commission->phase);
     measured(1.0, 0.004);
     commission->steps = 0;
     drive_commission(&drive, &snapshot);
