@@ -34,12 +34,13 @@ static int32_t fitted_knee_q17(const modulate_config_t *config, const commission
     return fx_max_s32(knee_q17, config->knee_q17 / COMPENSATION_KNEE_RANGE);
 }
 
-static bool is_plausible(const drive_t *drive, const commission_curve_t *curve)
+static bool is_resistance_plausible(const drive_t *drive, const commission_curve_t *curve)
 {
     const q31_t r0 = drive->motor->identify.r0;
-    return curve->r > r0 / 4 && curve->r < r0 * INT64_C(3) / 2 && curve->level >= 0; /* Q30 against Q31 */
+    return curve->r > r0 / 4 && curve->r < r0 * INT64_C(3) / 2; /* Q30 against Q31 */
 }
 
+/* drive_compensate() refuses an error that is negative or too large. */
 static bool evaluate(drive_t *drive, q15_t v_dc)
 {
     task_state_t *task = &drive->task;
@@ -49,7 +50,7 @@ static bool evaluate(drive_t *drive, q15_t v_dc)
     add_compensated(config, v_dc, curve);
     const q31_t dead_time = fx_div_q31(curve->level, v_dc * 32768);
     const compensation_t found = {fx_round_q15(dead_time / 2), fitted_knee_q17(config, curve), true};
-    return fits && is_plausible(drive, curve) && drive_compensate(drive, &found);
+    return fits && is_resistance_plausible(drive, curve) && drive_compensate(drive, &found);
 }
 
 /* One word for the fast ISR. A smaller bound (MO-11) must be in effect before a larger compensation is. */

@@ -141,11 +141,9 @@ void movement_step(const movement_config_t *config, uint32_t pole_pairs, movemen
     const bool asked = request->alive && request->movement != (uint8_t)MOVEMENT_NONE;
     if (request->alive && !asked && !in->runs) {
         *state = (movement_state_t){.phase = MOVEMENT_PHASE_IDLE, .failure = state->failure};
-        return;
     }
     if (asked && state->phase == MOVEMENT_PHASE_IDLE) {
         begin(pole_pairs, state, frame, request, in);
-        return;
     }
     if (!movement_is_agreed(state)) {
         return;

@@ -107,6 +107,27 @@ void test_a_change_on_purpose_is_no_damage_and_hides_none(void)
     expect_fault_within(DATA_CHECK_ROUND_MAX);
 }
 
+/* So that its time is bounded. The words before and behind those of the first step are damaged. */
+void test_a_step_compares_four_words(void)
+{
+    drive.data_check.at = 4;
+    flip(LIVE_FIRST + 3U * sizeof(uint32_t), 0);
+    flip(LIVE_FIRST + 8U * sizeof(uint32_t), 0);
+    TEST_ASSERT_EQUAL_HEX32(0, data_check_step(&drive));
+    TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, data_check_step(&drive));
+}
+
+void test_a_change_of_the_trim_hides_no_damage_of_other_parameters_or_of_the_word_behind_them(void)
+{
+    const size_t damaged[] = {offsetof(drive_t, parameters.torque_slew), offsetof(drive_t, mrai_parameters)};
+    for (unsigned k = 0; k < sizeof damaged / sizeof damaged[0]; k++) {
+        setUp();
+        flip(damaged[k], 0);
+        drive_restore_trim(&drive, 20);
+        expect_fault_within(DATA_CHECK_ROUND_MAX);
+    }
+}
+
 void test_the_pointer_to_the_motor_data_is_restored_by_the_majority(void)
 {
     const motor_t *const before = drive.motor;
@@ -125,6 +146,18 @@ void test_a_window_that_never_ends_is_found(void)
 {
     drive.fast.step_end += 1U << 20;
     expect_fault_within(5);
+}
+
+/* Four steps of ten periods. */
+void test_a_window_may_be_late_by_four_steps_and_not_by_a_period_more(void)
+{
+    data_check_t *const data_check = &drive.data_check;
+    TEST_ASSERT_EQUAL_HEX32(0, data_check_step(&drive));
+    TEST_ASSERT_EQUAL_UINT32(drive.fast.command_seen, data_check->windows);
+    data_check->periods = drive.samples.generation - 40U;
+    TEST_ASSERT_EQUAL_HEX32(0, data_check_step(&drive));
+    data_check->periods = drive.samples.generation - 41U;
+    TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, data_check_step(&drive));
 }
 
 void test_without_periods_no_window_is_expected(void)

@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "drive/publish.h"
+#include "drive/recall.h"
 #include "hal/mock_adc.h"
 #include "hal/mock_angle.h"
 #include "hal/mock_irq.h"
@@ -127,11 +128,111 @@ void test_what_was_identified_can_be_kept_and_recalled(void)
     const q31_t before = drive.task.identification.psi_delta;
     drive_init(&drive, &motor);
     TEST_ASSERT_TRUE(drive_recall(&drive, &kept));
+    TEST_ASSERT_TRUE(drive.task.recall.unconfirmed);
     task_1khz(&drive);
     TEST_ASSERT_INT32_WITHIN(2000, before, drive.task.identification.psi_delta);
     identify_record_t foreign = kept;
     foreign.version = 0;
+    drive_init(&drive, &motor);
     TEST_ASSERT_FALSE(drive_recall(&drive, &foreign));
+    TEST_ASSERT_FALSE(drive.task.recall.unconfirmed);
+}
+
+/* The windows of a machine that is that of the tables: three updates of ten steps agree. */
+void test_recalled_values_are_confirmed_by_windows_that_agree(void)
+{
+    weak = 0;
+    recall_begin(&drive);
+    milliseconds(20);
+    TEST_ASSERT_TRUE(drive.task.recall.unconfirmed);
+    milliseconds(40);
+    TEST_ASSERT_FALSE(drive.task.recall.unconfirmed);
+}
+
+void test_while_recalled_values_are_not_confirmed_nothing_that_acts_on_the_torque_is_reported(void)
+{
+    const identification_t *const reported = &drive.task.identification;
+    milliseconds(3000);
+    TEST_ASSERT_GREATER_THAN_INT(0, reported->confidence);
+    TEST_ASSERT_LESS_THAN_INT(-700, reported->psi_d_error);
+    drive.task.identify.kalman.x_q27[IDENTIFY_LQ] = IDENTIFY_ONE_Q27 / 2;
+    milliseconds(1);
+    TEST_ASSERT_NOT_EQUAL(0, reported->lq_error);
+    recall_begin(&drive);
+    milliseconds(1);
+    TEST_ASSERT_EQUAL_INT(0, reported->confidence);
+    TEST_ASSERT_EQUAL_INT(0, reported->psi_d_error);
+    TEST_ASSERT_EQUAL_INT32(0, reported->lq_error);
+    TEST_ASSERT_LESS_THAN_INT32(0, reported->psi_delta); /* does not act */
+}
+
+static void assert_limits(bool flux, bool resistance)
+{
+    const snapshot_t off = {.winding_dC = TEMPERATURE_UNKNOWN};
+    drive.task.identify.steps = 5; /* neither the update nor its prediction follows */
+    drive_identify(&drive, &off);
+    TEST_ASSERT_EQUAL(flux, drive.task.identification.psi_clamped);
+    TEST_ASSERT_EQUAL(resistance, drive.task.identification.r_clamped);
+}
+
+/* In Q27 four are 2^29. */
+void test_a_flux_or_a_resistance_of_four_standard_deviations_is_reported_as_at_its_limit(void)
+{
+    identify_state_t *const state = &drive.task.identify;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        setUp();
+        identify_set(state, IDENTIFY_FLUX, sign * ((1 << 29) - 1));
+        identify_set(state, IDENTIFY_R, sign * ((1 << 29) - 1));
+        assert_limits(false, false);
+        identify_set(state, IDENTIFY_FLUX, sign * (1 << 29));
+        assert_limits(true, false);
+        identify_set(state, IDENTIFY_FLUX, 0);
+        identify_set(state, IDENTIFY_R, sign * (1 << 29));
+        assert_limits(false, true);
+    }
+}
+
+/* Half and a quarter of the prior's variance are left: the quality is what has gone. */
+void test_the_quality_is_the_share_of_the_variance_that_has_gone(void)
+{
+    int32_t *const p_q30 = drive.task.identify.kalman.p_q30;
+    p_q30[kalman_p_index(IDENTIFY_FLUX, IDENTIFY_FLUX)] = 1 << 29;
+    p_q30[kalman_p_index(IDENTIFY_R, IDENTIFY_R)] = 1 << 28;
+    assert_limits(false, false);
+    TEST_ASSERT_INT_WITHIN(1, 16384, drive.task.identification.psi_quality);
+    TEST_ASSERT_INT_WITHIN(1, 24576, drive.task.identification.r_quality);
+}
+
+void test_the_variance_of_the_torque_is_reported(void)
+{
+    milliseconds(100);
+    TEST_ASSERT_GREATER_THAN_INT32(0, drive.task.identify.torque_variance_q30);
+    TEST_ASSERT_EQUAL_INT32(drive.task.identify.torque_variance_q30, drive.task.identification.torque_variance_q30);
+}
+
+/* The window is one in which the bridge acted; since then switching has been disabled. */
+void test_a_sample_without_the_bridge_identifies_nothing(void)
+{
+    milliseconds(2);
+    snapshot_t snapshot = {.sample = *sample_box_at(&drive.samples, drive.samples.generation),
+                           .window = *window_box_at(&drive.windows),
+                           .winding_dC = 200};
+    TEST_ASSERT_TRUE(snapshot.window.acting);
+    for (int acting = 0; acting <= 1; acting++) {
+        snapshot.sample.acting = acting != 0;
+        for (unsigned n = 0; n < 3U * IDENTIFY_STEPS; n++) {
+            drive_identify(&drive, &snapshot);
+        }
+        TEST_ASSERT_EQUAL(acting != 0, drive.task.identify.kalman.x_q27[IDENTIFY_FLUX] != 0);
+    }
+}
+
+/* By the number of steps a lower priority notices that a step has changed the values while it copied them. */
+void test_each_step_of_the_identification_is_counted(void)
+{
+    const uint32_t before = drive.task.identifications;
+    milliseconds(7);
+    TEST_ASSERT_EQUAL_UINT32(before + 7U, drive.task.identifications);
 }
 
 void test_the_papers_identification_starts_from_its_sample_when_it_is_selected(void)

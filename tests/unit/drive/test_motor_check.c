@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Valid motor data with one wrong value at a time: the check that reports it has the name of that value. */
+#include <math.h>
 #include <string.h>
 
+#include "control/current/transform.h"
 #include "drive/drive.h"
 #include "unity.h"
 
@@ -40,8 +42,8 @@ static const int16_t *reference(const int16_t *good, int16_t last)
 #define TABLES(X) \
     X(TASK_STEP, m.bases.periods_per_step = 3) \
     X(TASK_STEP, m.bases.periods_per_step = 41) \
-    X(TASK_STEP, m.bases.step_s = 0.79e-3F) \
-    X(TASK_STEP, m.bases.step_s = 1.26e-3F) \
+    X(TASK_STEP, m.bases.step_s = 0.8e-3F) \
+    X(TASK_STEP, m.bases.step_s = 1.25e-3F) \
     X(FLUX_TABLE_MISSING, m.flux_table.l_d = 0) \
     X(FLUX_TABLE_MISSING, m.flux_table.l_q = 0) \
     X(FLUX_TABLE_MISSING, m.flux_table.l_qq = 0) \
@@ -78,13 +80,16 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     X(OVER_CURRENT_LEVEL, m.monitor.i_trip = 0) \
     X(OVER_CURRENT_LEVEL, m.monitor.i_trip = Q15(0.8)) \
     X(DC_VOLTAGE_LEVELS, m.monitor.v_min = m.monitor.v_max) \
-    X(UNDER_VOLTAGE_LEVEL, m.monitor.v_min = 800) /* 1/v_ratio in Q31 over 2^22 is 853 */ \
+    X(UNDER_VOLTAGE_LEVEL, m.monitor.v_min = (int32_t)(m.parameters.current_control.per_ratio_q31 >> 22)) \
     X(CURRENT_SUM_LEVEL, m.monitor.zero_sequence_max = 0) \
     X(CURRENT_SUM_LEVEL, m.monitor.sum_max = 3 * m.monitor.zero_sequence_max - 1) \
     X(CURRENT_SUM_LEVEL, m.monitor.sum_max = 3 * Q15_MAX + 1) \
     X(CURRENT_SUM_LEVEL, m.monitor.zero_sequence_max = INT32_MAX; m.monitor.sum_max = INT32_MAX) \
     X(NORMAL_CURRENT_LEVEL, m.monitor.i_normal_squared_q30 = m.monitor.i_trip * m.monitor.i_trip) \
     X(NORMAL_CURRENT_LEVEL, m.monitor.i_normal_squared_q30 = -1) \
+    X(NORMAL_CURRENT_LEVEL, m.monitor.i_trip = m.monitor.zero_sequence_max + 11; m.monitor.i_normal_squared_q30 = 101) \
+    X(NORMAL_CURRENT_LEVEL, m.monitor.i_trip = m.monitor.zero_sequence_max; m.monitor.i_normal_squared_q30 = 1) \
+    X(NORMAL_CURRENT_LEVEL, m.monitor.i_trip = 1) \
     X(NORMAL_CURRENT_LEVEL, m.monitor.zero_sequence_max = m.monitor.i_trip; m.monitor.sum_max = 3 * m.monitor.i_trip) \
     X(SAFE_STATE_FLUX, m.safe_state.psi_f = 0) \
     X(SAFE_STATE_LEVELS, m.safe_state.share_open = m.safe_state.share_short)
@@ -106,11 +111,16 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.parameters.current_control.sigma_q24 = 0) \
     X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.parameters.current_control.integral_gain = 0) \
     X(VOLTAGE_RATIO, m.parameters.modulate.alpha_q31 = m.parameters.modulate.alpha_q31 / 1000 * 1001) \
-    X(VOLTAGE_RATIO, m.parameters.modulate.side_q31 += 20) \
-    X(VOLTAGE_RATIO, m.parameters.modulate.side_q31 -= 20) \
+    X(VOLTAGE_RATIO, set_side(&m, 16)) \
+    X(VOLTAGE_RATIO, set_side(&m, -16)) \
+    X(VOLTAGE_RATIO, set_ratio(&m, 17408, 123392)) /* the product is 1 + 2^-12 */ \
+    X(VOLTAGE_RATIO, m.parameters.modulate.alpha_q31 = Q31(0.5); set_side(&m, 0); \
+      m.parameters.current_control.per_ratio_q31 = UINT32_MAX) \
+    X(VOLTAGE_RATIO, scale_ratio(&m, 0.7); m.parameters.modulate.alpha_q31 = Q31(0.7)) \
     X(VOLTAGE_RATIO, m.parameters.current_control.per_ratio_q31 = 0) \
     X(VOLTAGE_RATIO, scale_ratio(&m, 0.499)) \
     X(VOLTAGE_RATIO, scale_ratio(&m, 0.701)) \
+    X(CURRENT_CONTROL_GAINS, m.parameters.current_control.sigma_q24 = 255) \
     X(VOLTAGE_RESERVE, m.voltage_reserve.v_ratio = 0) \
     X(VOLTAGE_RESERVE, m.voltage_reserve.trim_min = 1) \
     X(VOLTAGE_RESERVE, m.voltage_reserve.trim_max = -1) \
@@ -125,8 +135,54 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     X(CURRENT_KNEE, m.parameters.modulate.knee_q17 = 1 << 30) \
     X(CURRENT_KNEE, m.parameters.modulate.knee_side_q17 = 0) \
     X(CURRENT_KNEE, m.parameters.modulate.knee_side_q17 = 1 << 30) \
+    X(CLEAR_VOLTAGE, m.parameters.current_control.clear_q30 = largest_clear(&m) + 1U) \
     X(CLEAR_VOLTAGE, m.parameters.current_control.clear_q30 = UINT32_MAX) \
     X(CLEAR_VOLTAGE, m.parameters.current_control.clear_q30 = m.parameters.current_control.clear_q30 / 8 * 9)
+
+/* The end of each range, which must be accepted. */
+#define ENDS(X) \
+    X(m.bases.periods_per_step = 4) \
+    X(m.bases.periods_per_step = 40) \
+    X(m.bases.step_s = 0.801e-3F) \
+    X(m.bases.step_s = 1.249e-3F) \
+    X(set_side(&m, 15)) \
+    X(set_side(&m, -15)) \
+    X(set_ratio(&m, 21840, 98304)) /* the product is 1 - 2^-12 */ \
+    X(scale_ratio(&m, 0.501)) \
+    X(scale_ratio(&m, 0.699)) \
+    X(m.monitor.i_trip = Q15(0.8) - 1) \
+    X(m.monitor.v_min = m.monitor.v_max - 1) \
+    X(m.monitor.v_min = (int32_t)(m.parameters.current_control.per_ratio_q31 >> 22) + 1) \
+    X(m.monitor.sum_max = 3 * m.monitor.zero_sequence_max) \
+    X(m.monitor.sum_max = 3 * Q15_MAX) \
+    X(m.monitor.zero_sequence_max = 1) \
+    X(m.monitor.i_normal_squared_q30 = 0) \
+    X(m.monitor.i_trip = m.monitor.zero_sequence_max + 1; m.monitor.i_normal_squared_q30 = 0) \
+    X(m.monitor.i_trip = m.monitor.zero_sequence_max + 11; m.monitor.i_normal_squared_q30 = 100) \
+    X(m.safe_state.psi_f = 1) \
+    X(m.safe_state.share_open = m.safe_state.share_short - 1) \
+    X(m.parameters.current_control.setpoint_weight = 1) \
+    X(m.parameters.current_control.integral_gain = 0) \
+    X(m.parameters.current_control.integral_gain = Q15(0.5) - 1) \
+    X(m.parameters.current_control.tracking_gain_q34 = 0) \
+    X(m.parameters.current_control.sigma_q24 = 256) \
+    X(m.turning_control = smallest_turning; limit_only(&m); m.angle_tracker.turn_shift = 0) \
+    X(m.voltage_reserve.v_ratio = 1) \
+    X(m.voltage_reserve.trim_min = 0) \
+    X(m.voltage_reserve.trim_max = 0) \
+    X(m.parameters.torque_loop.authority = 1) \
+    X(m.parameters.torque_loop.torque_min = 1) \
+    X(m.torque_max = 1) \
+    X(m.parameters.modulate.longest_q31 = Q31(0.25) + 1) \
+    X(m.parameters.modulate.longest_q31 = m.parameters.modulate.nearer_rail_q31) \
+    X(m.parameters.modulate.nearer_rail_q31 = Q31(0.5)) \
+    X(m.parameters.modulate.dead_time_q16 = 0) \
+    X(m.parameters.modulate.dead_time_q16 = Q16(0.2) - 1) \
+    X(m.parameters.modulate.knee_q17 = 1) \
+    X(m.parameters.modulate.knee_q17 = (1 << 30) - 1) \
+    X(m.parameters.modulate.knee_side_q17 = 1) \
+    X(m.parameters.modulate.knee_side_q17 = (1 << 30) - 1) \
+    X(m.parameters.current_control.clear_q30 = largest_clear(&m))
 
 #define MRAI(X) \
     X(MRAI_GAINS, law.r0 = 0) \
@@ -196,6 +252,28 @@ void test_both_laws_of_current_control_are_accepted_with_the_gains_that_they_nee
     limit_only(&m);
     m.angle_tracker.turn_shift = 1;
     TEST_ASSERT_EQUAL(MOTOR_CHECK_OK, motor_check(&m));
+}
+
+static const turning_control_config_t smallest_turning = {
+    .per_period_q29 = 1, .approach_q32 = 1, .feedback_q32 = 1, .integral_q32 = 1, .drop_q29 = 0, .knee_turns_q27 = 1};
+
+/* sqrt(3)/2 of the ratio and so many LSB. */
+static void set_side(motor_t *m, int32_t more)
+{
+    m->parameters.modulate.side_q31 = fx_mul_q31(m->parameters.modulate.alpha_q31, Q31(SQRT3_HALF)) + more;
+}
+
+/* Ratio and inverse by those bits of both whose product is compared with 1: Q15 and Q16. */
+static void set_ratio(motor_t *m, int32_t ratio_q15, uint32_t per_ratio_q16)
+{
+    m->parameters.modulate.alpha_q31 = ratio_q15 * 65536;
+    m->parameters.current_control.per_ratio_q31 = per_ratio_q16 << 15;
+    set_side(m, 0);
+}
+
+static uint32_t largest_clear(const motor_t *m)
+{
+    return motor_clear_q30(&m->parameters, m->parameters.modulate.dead_time_q16 / 2);
 }
 
 /* All three copies of the ratio agree. */
@@ -274,6 +352,37 @@ void test_one_wrong_value_is_reported_by_its_check_and_every_check_can_be_report
     for (size_t n = 0; n < CHECKS; n++) {
         TEST_ASSERT_TRUE_MESSAGE(checks[n].seen, checks[n].name);
     }
+}
+
+/* The bound of (MO-11) is 0, so that it does not forbid what the checks before it accept. */
+#define ACCEPT(...) \
+    do { \
+        motor_t m = motor; \
+        m.parameters.current_control.clear_q30 = 0; \
+        __VA_ARGS__; \
+        TEST_ASSERT_EQUAL_STRING_MESSAGE("OK", named(motor_check(&m))->name, #__VA_ARGS__); \
+    } while (0);
+
+void test_the_ends_of_all_ranges_are_accepted(void)
+{
+    ENDS(ACCEPT)
+}
+
+/* (MO-11): 2 (longest - dead time)/sqrt(3) over the ratio, squared; at most (31/32)^2. The ratio's inverse has 16 bits,
+ * of which the square loses up to 2^-15, and dead time and product two more: 1e-4. */
+void test_the_voltage_that_cannot_be_limited_follows_from_the_longest_pulse_and_the_dead_time(void)
+{
+    motor_t m = motor;
+    const double ratio = m.parameters.modulate.alpha_q31 / 2147483648.0;
+    for (int32_t dead_time = 0; dead_time < 16000; dead_time += 500) {
+        const double longest = (m.parameters.modulate.longest_q31 >> 16) - dead_time;
+        const double per_unit = (longest > 0.0) ? 2.0 * longest / 32768.0 / sqrt(3.0) / ratio : 0.0;
+        TEST_ASSERT_DOUBLE_WITHIN(1e-4, per_unit * per_unit, motor_clear_q30(&m.parameters, dead_time) / 1073741824.0);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, motor_clear_q30(&m.parameters, 30000));
+    set_ratio(&m, 16385, 131060);
+    m.parameters.modulate.longest_q31 = Q31(0.5);
+    TEST_ASSERT_EQUAL_UINT32(31U * 31U << 20, motor_clear_q30(&m.parameters, 0));
 }
 
 void test_the_first_reason_is_kept_and_a_passed_check_is_no_fault(void)

@@ -114,6 +114,19 @@ void test_the_imposed_angle_turns_with_a_slope_in_both_directions(void)
     request.direction = MOVEMENT_STAND;
     steps(2);
     TEST_ASSERT_EQUAL_INT32(0, frame.rate);
+    steps(1);
+    TEST_ASSERT_EQUAL_INT32(0, frame.rate);
+}
+
+void test_with_switching_disabled_the_imposed_angle_stands(void)
+{
+    begun(MOVEMENT_IMPOSED);
+    request.direction = MOVEMENT_FORWARD;
+    steps(4);
+    TEST_ASSERT_EQUAL_INT32(400, frame.rate);
+    in.runs = false;
+    steps(1);
+    TEST_ASSERT_EQUAL_INT32(0, frame.rate);
 }
 
 void test_the_currents_are_cut_and_follow_with_a_slope(void)
@@ -155,6 +168,41 @@ void test_a_damped_current_is_weak_while_the_rotor_becomes_faster(void)
     TEST_ASSERT_EQUAL_INT32(900, state.i_ref.d);
 }
 
+void test_a_current_without_damping_stays_while_the_rotor_becomes_faster(void)
+{
+    begun(MOVEMENT_IMPOSED);
+    request.i.d = 900;
+    steps(10);
+    in.theta_m = 1000;
+    steps(10);
+    TEST_ASSERT_EQUAL_INT32(900, state.i_ref.d);
+}
+
+void test_both_currents_are_weakened(void)
+{
+    begun(MOVEMENT_IMPOSED);
+    request.i = (dq_q15_t){900, -450};
+    request.damped = true;
+    steps(10);
+    in.theta_m = 1000;
+    steps(10);
+    TEST_ASSERT_EQUAL_INT32(180, state.i_ref.d);
+    TEST_ASSERT_EQUAL_INT32(-90, state.i_ref.q);
+}
+
+void test_at_constant_speed_a_damped_current_is_not_weakened(void)
+{
+    begun(MOVEMENT_IMPOSED);
+    request.i.d = 900;
+    request.damped = true;
+    for (int interval = 0; interval < 4; interval++) {
+        in.theta_m += 1000;
+        steps(10);
+    }
+    TEST_ASSERT_FALSE(state.weak);
+    TEST_ASSERT_EQUAL_INT32(900, state.i_ref.d);
+}
+
 static void refused(void)
 {
     steps(1);
@@ -175,6 +223,10 @@ void test_a_movement_begins_only_with_switching_disabled_and_in_the_right_state(
     request.pole_pairs = MOVEMENT_PAIRS_MAX + 1U;
     refused();
     request.pole_pairs = MOVEMENT_PAIRS_MAX;
+    steps(1);
+    TEST_ASSERT_EQUAL_INT(MOVEMENT_PHASE_AGREED, state.phase);
+    setUp();
+    request.pole_pairs = 1;
     steps(1);
     TEST_ASSERT_EQUAL_INT(MOVEMENT_PHASE_AGREED, state.phase);
 }
@@ -208,6 +260,10 @@ void test_silence_before_the_first_message_means_nothing(void)
     request = (movement_request_t){0};
     steps(3);
     TEST_ASSERT_EQUAL_INT(MOVEMENT_PHASE_IDLE, state.phase);
+    setUp();
+    request.alive = false;
+    steps(3);
+    TEST_ASSERT_EQUAL_INT(MOVEMENT_PHASE_IDLE, state.phase);
 }
 
 void test_silence_ends_a_movement_also_before_switching_is_enabled(void)
@@ -229,6 +285,13 @@ void test_another_movement_or_none_ends_one_that_runs(void)
     request.movement = MOVEMENT_NONE;
     steps(1);
     ended_by(MOVEMENT_FAILURE_REFUSED);
+}
+
+void test_a_torque_request_at_the_beginning_ends_the_movement_at_once(void)
+{
+    in.has_request = true;
+    steps(1);
+    ended_by(MOVEMENT_FAILURE_STOPPED);
 }
 
 void test_a_torque_request_and_a_fault_end_a_movement(void)

@@ -179,3 +179,76 @@ void test_pulses_need_a_connection_without_currents(void)
     TEST_ASSERT_EQUAL_INT(PULSES_PULSE, drive.pulses_state.phase);
     TEST_ASSERT_EQUAL_HEX32(0xC0000000U, sample()->theta_e);
 }
+
+/* Five electrical turns for each of the sensor, whatever the motor data say; one LSB for the ratio's rounding. */
+void test_angle_advance_and_speed_of_the_control_are_those_of_the_connection(void)
+{
+    const int32_t pole_pairs = (int32_t)motor.angle_tracker.pole_pairs;
+    const command_t command = {.run = BRIDGE_MOVED};
+    sample_t now = {.theta_m = 0x10000000U, .point = {.omega = 100000 * pole_pairs}};
+    TEST_ASSERT_NOT_EQUAL(5, pole_pairs);
+    wanted->pole_pairs = 5;
+    run();
+    TEST_ASSERT_INT32_WITHIN(1, 5000, drive_take_frame(&drive, &command, &now, 1000 * pole_pairs));
+    TEST_ASSERT_EQUAL_HEX32(0x50000000U, now.theta_e);
+    TEST_ASSERT_INT32_WITHIN(1, 500000, now.point.omega);
+    TEST_ASSERT_EQUAL_INT32(100000 * pole_pairs, drive.frame_angle.omega_sensor);
+}
+
+void test_a_fault_and_the_papers_identification_end_a_movement(void)
+{
+    for (int paper = 0; paper <= 1; paper++) {
+        setUp();
+        run();
+        if (paper) {
+            drive.request.identification_mode = IDENTIFICATION_PAPER;
+        } else {
+            drive_raise_fault(&drive, FAULT_OVER_CURRENT);
+        }
+        seam_periods(20);
+        TEST_ASSERT_EQUAL_INT(MOVEMENT_FAILURE_STOPPED, drive.task.movement.failure);
+        TEST_ASSERT_FALSE(seam.gates);
+    }
+}
+
+void test_a_movement_ends_above_the_largest_speed_of_the_sensor(void)
+{
+    const snapshot_t at_speed = {.generation = 0};
+    run();
+    drive.frame_angle.omega_sensor = -motor.movement.omega_max;
+    drive_move(&drive, &at_speed);
+    TEST_ASSERT_TRUE(movement_is_agreed(&drive.task.movement));
+    drive.frame_angle.omega_sensor--;
+    drive_move(&drive, &at_speed);
+    TEST_ASSERT_EQUAL_INT(MOVEMENT_FAILURE_FAST, drive.task.movement.failure);
+}
+
+/* A rotor that has begun to turn moves more in one interval of the damping than in the one before. */
+void test_the_rotor_that_becomes_faster_weakens_a_damped_current(void)
+{
+    bool weak = false;
+    wanted->movement = MOVEMENT_IMPOSED;
+    wanted->damped = true;
+    run();
+    seam_periods(300);
+    TEST_ASSERT_FALSE(drive.task.movement.weak);
+    seam.theta_m += 0x00100000U;
+    for (int n = 0; n < 12; n++) {
+        seam_periods(10);
+        weak = weak || drive.task.movement.weak;
+    }
+    TEST_ASSERT_TRUE(weak);
+    TEST_ASSERT_TRUE(movement_is_agreed(&drive.task.movement));
+}
+
+void test_the_bridge_controls_currents_or_makes_pulses_with_or_without_a_movement(void)
+{
+    TEST_ASSERT_EQUAL_INT(BRIDGE_CONTROL, drive_bridge_mode(&drive, true));
+    drive.task.pulsing.phase = PULSES_PULSE;
+    TEST_ASSERT_EQUAL_INT(BRIDGE_PULSES, drive_bridge_mode(&drive, true));
+    drive.task.movement.phase = MOVEMENT_PHASE_AGREED;
+    TEST_ASSERT_EQUAL_INT(BRIDGE_MOVED_PULSES, drive_bridge_mode(&drive, true));
+    TEST_ASSERT_EQUAL_INT(BRIDGE_OFF, drive_bridge_mode(&drive, false));
+    drive.task.pulsing.phase = PULSES_DONE;
+    TEST_ASSERT_EQUAL_INT(BRIDGE_MOVED, drive_bridge_mode(&drive, true));
+}

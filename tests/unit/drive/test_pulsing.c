@@ -185,3 +185,48 @@ void test_the_failure_of_the_fast_isr_is_passed_on(void)
     TEST_ASSERT_EQUAL_INT(PULSES_FAILED, drive.task.pulsing.phase);
     TEST_ASSERT_EQUAL_INT(PULSES_MOVED, drive.task.pulsing.failure);
 }
+
+void test_pulses_along_one_axis_alone_are_accepted(void)
+{
+    wanted->d.v = 0;
+    accepted();
+    wanted->q.v = 0;
+    accepted();
+}
+
+/* With a margin of a sixteenth in the square. */
+void test_the_monitored_current_is_the_largest_one_of_the_pulses_and_a_margin(void)
+{
+    const double i_max = motor.commission.i_max;
+    ask();
+    TEST_ASSERT_DOUBLE_WITHIN(1.0, i_max * i_max * 17.0 / 16.0, drive.pulses.square_max);
+}
+
+void test_each_accepted_start_has_the_next_number(void)
+{
+    for (uint16_t number = 1; number <= 3; number++) {
+        ask();
+        TEST_ASSERT_EQUAL_UINT16(number, drive.pulses.number);
+        drive.pulses_state = (pulses_state_t){.phase = PULSES_DONE, .number = number};
+        drive_pulse(&drive, &snapshot);
+        TEST_ASSERT_EQUAL_INT(PULSES_DONE, drive.task.pulsing.phase);
+    }
+}
+
+void test_without_pulses_the_end_of_the_run_is_no_failure(void)
+{
+    drive.task.run_state = RUN_STATE_OFF;
+    drive_pulse(&drive, &snapshot);
+    TEST_ASSERT_EQUAL_INT(PULSES_IDLE, drive.task.pulsing.phase);
+    TEST_ASSERT_EQUAL_INT(PULSES_GOOD, drive.task.pulsing.failure);
+}
+
+void test_pulses_that_end_in_the_step_in_which_the_run_ends_count_as_stopped(void)
+{
+    ask();
+    drive.pulses_state = (pulses_state_t){.phase = PULSES_DONE, .number = drive.pulses.number};
+    drive.task.run_state = RUN_STATE_OFF;
+    drive_pulse(&drive, &snapshot);
+    TEST_ASSERT_EQUAL_INT(PULSES_FAILED, drive.task.pulsing.phase);
+    TEST_ASSERT_EQUAL_INT(PULSES_STOPPED, drive.task.pulsing.failure);
+}

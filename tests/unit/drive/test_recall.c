@@ -97,6 +97,35 @@ void test_a_residual_of_either_axis_ends_the_agreement(void)
     }
 }
 
+/* At half of the base speed and with 0.0745 (80000000 in Q30) of noise a quarter of it is 10000000 in Q30; nine tenths
+ * of that are allowed, because the mean contains nine of the ten steps. */
+void test_residuals_of_a_quarter_of_the_noise_of_the_flux_agree_and_larger_ones_of_either_axis_do_not(void)
+{
+    const dq_q30_t larger[] = {{9000001, 0}, {-9000001, 0}, {0, 9000001}, {0, -9000001}};
+    seam.motor.identify.noise_flux_q30 = 80000000;
+    state->mean.e = (dq_q30_t){9000000, -9000000};
+    updates(3, FAST);
+    TEST_ASSERT_FALSE(drive.task.recall.unconfirmed);
+    for (unsigned k = 0; k < sizeof larger / sizeof larger[0]; k++) {
+        setUp();
+        seam.motor.identify.noise_flux_q30 = 80000000;
+        state->mean.e = larger[k];
+        updates(3, FAST);
+        assert_undecided();
+    }
+}
+
+/* Half of a corner at 1000 counts. */
+void test_updates_count_as_trials_from_half_of_the_corner_speed_on(void)
+{
+    seam.motor.identify.local_corner = 1000;
+    state->mean.e.d = Q31(0.5);
+    updates(200, 499 << 16);
+    assert_undecided();
+    updates(50, -(500 << 16));
+    assert_rejected();
+}
+
 void test_fifty_updates_with_a_residual_at_speed_reject_the_values_and_at_low_speed_none_does(void)
 {
     state->mean.e.d = Q31(0.5);
