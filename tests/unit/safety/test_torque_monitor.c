@@ -326,6 +326,7 @@ void test_the_lag_of_the_tracked_speed_is_known_beyond_a_count(void)
     const dq_q15_t psi = {-8651, 11534};
     TEST_ASSERT_EQUAL_INT(0, torque_monitor_missing_voltage(0, psi));
     TEST_ASSERT_EQUAL_INT(53, torque_monitor_missing_voltage(120, psi));
+    TEST_ASSERT_EQUAL_INT(1, torque_monitor_missing_voltage(1, (dq_q15_t){0, 24576})); /* 0.75, rounded */
     TEST_ASSERT_EQUAL_INT(55, torque_monitor_missing_voltage(124, psi));
     TEST_ASSERT_EQUAL_INT(55, torque_monitor_missing_voltage(-124, psi));
 }
