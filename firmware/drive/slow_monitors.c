@@ -3,7 +3,6 @@
 
 #include "control/current/transform.h"
 #include "drive/step_mean.h"
-#include "fx/vec.h"
 
 static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
 {
@@ -24,14 +23,7 @@ static bool is_at_rest(const snapshot_t *snapshot)
     return !snapshot->sample.acting && !snapshot->gates && drive_stands_still(snapshot->sample.point.omega);
 }
 
-/* The rotational voltage that the tracked speed does not contain while it is behind the rotor's. */
-static q15_t missing_voltage(const drive_t *drive, q15_t lag)
-{
-    const dq_q15_t psi = drive->task.psi_ref;
-    return (lag == 0) ? 0 : fx_mul_q15(fx_abs_q15(lag), fx_magnitude(psi.d, psi.q));
-}
-
-static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
+static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref, q15_t u_behind)
 {
     const sample_t *sample = &snapshot->sample;
     task_state_t *task = &drive->task;
@@ -45,7 +37,7 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q
         .i = sample->point.i,
         .i_ref = task->i_ref,
         .i_mean = step_mean_current(drive, snapshot),
-        .u_behind = missing_voltage(drive, snapshot->lag),
+        .u_behind = u_behind,
         .phases = measure_phases(sample->i_ab, sample->zero_q28),
         .phases_ref = at_once ? phases_ref : in_phases(expected, sample->theta_e),
         .omega = fx_q15_from_q31(sample->point.omega),
@@ -200,11 +192,12 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
     const bool is_window_new = !snapshot->mrai_is_chosen && snapshot->window.acting && snapshot->sample.acting;
     const bool acting = !is_compensation_new(drive) && is_window_new &&
                         !is_fast(turns_of_step_q60(drive, snapshot->sample.point.omega));
-    const uint32_t of_currents = check_currents(drive, snapshot, phases_ref);
+    const q15_t u_behind = torque_monitor_missing_voltage(snapshot->lag, drive->task.psi_ref);
+    const uint32_t of_currents = check_currents(drive, snapshot, phases_ref, u_behind);
     if (drive_is_moving(drive)) { /* with the angle of a movement, comparisons with the motor data have no meaning */
         return (of_currents & (FAULT_TEMPERATURE | FAULT_OVER_SPEED | FAULT_INPUT | FAULT_CURRENT_STUCK)) | shorted;
     }
-    const bool behind = torque_monitor_is_behind(&drive->motor->torque_monitor, snapshot->lag, drive->task.psi_ref);
+    const bool behind = u_behind > drive->motor->torque_monitor.v_lag;
     uint32_t faults = of_currents | check_torque(drive, snapshot) | shorted;
     faults |= check_angle(drive, snapshot, phases_ref, acting, behind);
     faults |= check_launch(drive, snapshot, acting, behind);

@@ -13,12 +13,12 @@
 #define ZERO_STEPS 50
 #define DEVIATION_UNLIMITED 5 /* per step while the voltage is not limited: confirmed in a fifth of the time */
 
-/* (MN-1); samples without a deviation decrease the count. */
-static uint32_t deviation(const plausibility_config_t *config, plausibility_state_t *state, const plausibility_in_t *in)
+/* (MN-1); samples without a deviation decrease the count. current: the magnitude of the expected one. */
+static uint32_t deviation(const plausibility_config_t *config, plausibility_state_t *state, const plausibility_in_t *in,
+                          q15_t current)
 {
     const dq_q15_t i_ref = state->expected;
     const q15_t error = fx_magnitude(fx_sat_q15(in->i.d - i_ref.d), fx_sat_q15(in->i.q - i_ref.q));
-    const q15_t current = fx_magnitude(i_ref.d, i_ref.q);
     const bool bad = error > config->e_0 + (current >> 3);
     const int32_t step = bad ? (in->voltage_limited ? 1 : DEVIATION_UNLIMITED) : -DEVIATION_UNLIMITED;
     state->deviation = (int16_t)fx_clamp_q31(state->deviation + step, 0, config->deviation_steps);
@@ -40,9 +40,8 @@ static bool is_phase_lost(const plausibility_config_t *config, int8_t count[2], 
 }
 
 static uint32_t lost_phases(const plausibility_config_t *config, plausibility_state_t *state,
-                            const plausibility_in_t *in)
+                            const plausibility_in_t *in, q15_t current)
 {
-    const q15_t current = fx_magnitude(state->expected.d, state->expected.q);
     const int32_t behind = fx_mul_gain_q15(config->behind_gain, in->u_behind); /* (MN-43) */
     const int32_t alive = fx_max_s32(config->i_alive, current >> 3) + behind;
     const bool a_lost = is_phase_lost(config, state->lost[0], alive, in->phases_ref.a, in->phases.a);
@@ -145,6 +144,7 @@ uint32_t plausibility_step(const plausibility_config_t *config, plausibility_sta
     }
     faults |= (in->gate_exceeded_steps >= config->gate_exceeded_steps) ? FAULT_TORQUE : 0U;
     state->expected = plausibility_expected(config, state, in->i_ref);
-    return faults | deviation(config, state, in) | oscillation(config, state, in) | stuck_sensors(config, state, in) |
-           lost_phases(config, state, in);
+    const q15_t current = fx_magnitude(state->expected.d, state->expected.q);
+    return faults | deviation(config, state, in, current) | oscillation(config, state, in) |
+           stuck_sensors(config, state, in) | lost_phases(config, state, in, current);
 }

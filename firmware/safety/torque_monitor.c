@@ -38,9 +38,9 @@ q15_t torque_monitor_lag(const torque_monitor_config_t *config, const torque_mon
     return (q15_t)(lag - fx_clamp_q31(lag, -config->lag_noise, config->lag_noise));
 }
 
-bool torque_monitor_is_behind(const torque_monitor_config_t *config, q15_t lag, dq_q15_t psi)
+q15_t torque_monitor_missing_voltage(q15_t lag, dq_q15_t psi)
 {
-    return fx_mul_q15(fx_abs_q15(lag), fx_magnitude(psi.d, psi.q)) > config->v_lag;
+    return (lag == 0) ? 0 : fx_mul_q15(fx_abs_q15(lag), fx_magnitude(psi.d, psi.q));
 }
 
 /* Resistance at the winding's temperature, and its largest error. */
@@ -67,10 +67,11 @@ static resistance_t resistance(const torque_monitor_config_t *config, int16_t wi
     return (resistance_t){middle >> 15, (half_range + middle / TOLERANCE) >> 15};
 }
 
-/* Present speed and resistance of the machine, each with its largest error. */
+/* Present speed and resistance of the machine, each with its largest error, and the magnitude of its current. */
 typedef struct {
     speed_t speed;
     resistance_t r;
+    q15_t current;
 } machine_t;
 
 /* d psi/dt from the tables: the power that changes the field is not shaft power (MN-6). */
@@ -90,13 +91,12 @@ static bool is_torque_excessive(const torque_monitor_config_t *config, torque_mo
     state->deviation = fx_add2_q31(state->deviation, fx_mul_q30(config->mean_rate, step));
     const int32_t mean = fx_q15_from_q31(state->deviation);
 
-    const q15_t current = fx_magnitude(in->i.d, in->i.q);
     const q15_t allowed = fx_sat_q15(config->t_0 + (fx_abs_q15(in->torque) >> 3));
     /* The tables' slope is not exact, and the flux does not change uniformly during the step. */
-    const q15_t drop_error = fx_mul_gain_q15(now->r.error, current);
+    const q15_t drop_error = fx_mul_gain_q15(now->r.error, now->current);
     const q15_t v_error = fx_sat_q15(config->v_0 + (fx_abs_q31(rate.d) + fx_abs_q31(rate.q)) / 2 + drop_error);
     const int32_t limit = fx_mul_q15(allowed, fx_abs_q15(now->speed.omega)) +
-                          fx_mul_q15(v_error, fx_add_q15(current, config->i_0)) +
+                          fx_mul_q15(v_error, fx_add_q15(now->current, config->i_0)) +
                           fx_mul_q15(fx_abs_q15(in->torque), now->speed.doubt);
     if (fx_abs_q31(commanded) < fx_mul_q15(config->t_0, fx_abs_q15(now->speed.omega))) {
         return fx_abs_q31(mean) > limit; /* near zero torque both directions count */
@@ -117,11 +117,10 @@ static bool is_angle_implausible(const torque_monitor_config_t *config, const to
     if (d_share < config->v_0 >> 1) {
         return false; /* at low speed the inverter's voltage error hides the back-EMF */
     }
-    const q15_t current = fx_magnitude(in->i.d, in->i.q);
     /* Doubled resistance; half of the flux rate for noise, and all of it beyond v_0, because a real change may have
      * ended before the sample. */
     const int32_t flux_rate_abs = fx_abs_q31(rate.d) + fx_abs_q31(rate.q);
-    const int32_t v_error = (config->v_0 >> 1) + config->v_noise + fx_mul_gain_q15(now->r.r, current) +
+    const int32_t v_error = (config->v_0 >> 1) + config->v_noise + fx_mul_gain_q15(now->r.r, now->current) +
                             flux_rate_abs / 2 + fx_max_s32(flux_rate_abs - config->v_0, 0);
     const q15_t psi_d = fx_abs_q15(in->psi.d), psi_q = fx_abs_q15(in->psi.q);
     const int32_t d_limit = d_share + (fx_mul_q15(speed_abs, psi_q) >> 3) + fx_mul_q15(now->speed.doubt, psi_q) +
@@ -140,7 +139,8 @@ uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monit
         return 0;
     }
     const dq_q15_t rate = flux_rate(config, state, in->psi);
-    const machine_t now = {follow_speed(config, state, in->omega), resistance(config, in->winding_dC)};
+    const machine_t now = {follow_speed(config, state, in->omega), resistance(config, in->winding_dC),
+                           fx_magnitude(in->i.d, in->i.q)};
     const dq_q15_t psi_mean = {(in->psi.d + state->psi.d) / 2, (in->psi.q + state->psi.q) / 2};
     state->psi = in->psi;
     state->omega = in->omega;

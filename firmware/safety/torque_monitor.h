@@ -63,9 +63,9 @@ typedef struct {
 /** Lag of the tracked speed behind the rotor's beyond the apparent lag that one count of the sensor causes, else 0
  * (MN-41). Before torque_monitor_step() with the same speed. */
 q15_t torque_monitor_lag(const torque_monitor_config_t *config, const torque_monitor_state_t *state, q15_t tracked);
-/** Whether the rotational voltage of flux psi that this lag omits is large enough to disturb the monitors
- * frozen_angle.h and launch_power.h. */
-bool torque_monitor_is_behind(const torque_monitor_config_t *config, q15_t lag, dq_q15_t psi);
+/** The rotational voltage of flux psi that the tracked speed does not contain with this lag. Above v_lag it disturbs
+ * the monitors frozen_angle.h and launch_power.h. */
+q15_t torque_monitor_missing_voltage(q15_t lag, dq_q15_t psi);
 uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monitor_state_t *state,
                              const torque_monitor_in_t *in);
 

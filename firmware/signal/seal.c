@@ -9,9 +9,11 @@ typedef uint32_t FX_ANY_OBJECT sealed_word_t;
 uint32_t seal_of(const void *data, uint32_t size)
 {
     const sealed_word_t *word = data;
+    const void *const end = (const uint8_t *)data + size;
     uint32_t seal = SEAL_START;
-    for (uint32_t k = 0; k < size / sizeof *word; k++) {
-        seal = seal_add(seal, word[k]);
+    while ((const void *)word != end) {
+        seal = seal_add(seal, *word);
+        word++;
     }
     return seal;
 }

@@ -6,7 +6,7 @@
 #include "fx/trig.h"
 #include "signal/seal.h"
 
-#define PARTS_PER_STEP 4        /* the whole table in 16 steps */
+#define QUARTER 16U             /* parts of the table in a quarter of a turn: the whole table in 16 steps */
 #define ADVANCE_MIN (1 << 26)   /* 1/64 turn per step: below, the second difference of a harmonic is too small */
 #define ADVANCE_MAX (1 << 30)   /* 1/4 turn per step: above, the second harmonic aliases */
 #define ADVANCE_FAST_SHIFT 28   /* between 1/16 and 1/8 turn per step mu = 1/16; 4 (d - a) stays below 2^29 */
@@ -24,14 +24,16 @@ static FX_NOT_INLINED void harmonics(uint32_t theta, int32_t q31[ANGLE_HARMONICS
     }
 }
 
-/* c += d harmonic/64: the high word of Q32 * Q31 is half of the product in Q32. For mu = 1/16 the caller passes 4 d. */
+/* c += d harmonic/64: the high word of Q32 * Q31 is half of the product in Q32, and the harmonic, whose sines have 16
+ * bits, loses nothing by the shift of 5. For mu = 1/16 the caller passes 4 d. */
 static void update_coefficients(const angle_harmonics_config_t *config, angle_harmonics_state_t *state, int32_t d)
 {
     int32_t at_q31[ANGLE_HARMONICS];
     harmonics(state->last, at_q31);
+    int32_t *c = state->c;
     for (unsigned n = 0; n < ANGLE_HARMONICS; n++) {
-        const int32_t updated = state->c[n] + ((fx_mulhi(d, at_q31[n]) + 16) >> 5);
-        state->c[n] = fx_clamp_q31(updated, -config->max, config->max);
+        const int32_t updated = fx_mulhi_add(c[n], d, at_q31[n] >> 5);
+        c[n] = fx_clamp_q31(updated, -config->max, config->max);
     }
 }
 
@@ -43,15 +45,28 @@ static int32_t without_acceleration(angle_harmonics_state_t *state, int32_t d)
     return rest;
 }
 
-static int32_t correction(const angle_harmonics_state_t *state, uint32_t part)
+/* One part of the table and those a quarter, a half and three quarters of a turn further. A quarter of a turn makes the
+ * negative sine of theta of its cosine and the cosine of its sine, and changes the sign of the second harmonic. Returns
+ * the last part plus a quarter. */
+static uint32_t correct_parts(const angle_harmonics_state_t *state, uint32_t part,
+                              volatile int32_t table[ANGLE_HARMONICS_PARTS])
 {
     int32_t at_q31[ANGLE_HARMONICS];
+    const int32_t *c = state->c;
     harmonics((2U * part + 1U) << (ANGLE_HARMONICS_SHIFT - 1), at_q31);
-    int32_t half = 0;
-    for (unsigned n = 0; n < ANGLE_HARMONICS; n++) {
-        half += fx_mulhi(state->c[n], at_q31[n]);
+    int32_t first = fx_mulhi_add(fx_mulhi(c[0], at_q31[0]), c[1], at_q31[1]);
+    int32_t further = fx_mulhi_sub(fx_mulhi(c[1], at_q31[0]), c[0], at_q31[1]);
+    int32_t second = fx_mulhi_add(fx_mulhi(c[2], at_q31[2]), c[3], at_q31[3]);
+    while (part < ANGLE_HARMONICS_PARTS) {
+        const int32_t sum = first + second;
+        second = -second;
+        const int32_t opposite = -first;
+        first = further;
+        further = opposite;
+        table[part] = 2 * sum;
+        part += QUARTER;
     }
-    return 2 * half;
+    return part;
 }
 
 /* Of the coefficients, complemented, so that a state of zeros is sealed (DI-3). */
@@ -64,9 +79,9 @@ void angle_harmonics_step(const angle_harmonics_config_t *config, angle_harmonic
                           volatile int32_t table[ANGLE_HARMONICS_PARTS])
 {
     const int32_t advance = (int32_t)(theta - state->last);
-    const int32_t d = (int32_t)(theta - 2U * state->last + state->before);
+    const int32_t d = (int32_t)((uint32_t)advance - state->advance);
     const int32_t speed = fx_abs_q31(advance);
-    if (state->seal_complement != seal_complement(state)) {
+    if (seal_complement(state) != state->seal_complement) {
         state->damaged = true;
     }
     if (speed >= ADVANCE_MIN && speed <= ADVANCE_MAX && fx_abs_q31(d) <= speed >> DIFFERENCE_MAX_SHIFT) {
@@ -74,12 +89,7 @@ void angle_harmonics_step(const angle_harmonics_config_t *config, angle_harmonic
         update_coefficients(config, state, ((speed >> ADVANCE_FAST_SHIFT) == 1) ? 4 * of_sensor : of_sensor);
         state->seal_complement = seal_complement(state);
     }
-    state->before = state->last;
     state->last = theta;
-    uint32_t part = state->part % ANGLE_HARMONICS_PARTS;
-    do {
-        table[part] = correction(state, part);
-        part++;
-    } while (part % PARTS_PER_STEP != 0U);
-    state->part = (uint8_t)part;
+    state->advance = (uint32_t)advance;
+    state->part = (uint8_t)(1U + correct_parts(state, state->part % QUARTER, table));
 }

@@ -28,9 +28,9 @@ typedef struct {
 } angle_harmonics_config_t;
 
 typedef struct {
-    uint32_t last, before;
+    uint32_t last, advance; /* angle of the last step, and its advance in that step */
     int32_t c[ANGLE_HARMONICS];
-    uint8_t part;             /* of the table, the next to be computed */
+    uint8_t part;             /* of a quarter of the table, the next to be computed */
     bool damaged;             /* the seal did not match: the memory has changed a coefficient */
     int16_t acceleration_q21; /* mean second difference, 2^21 = one turn per step squared */
     uint32_t seal_complement; /* of the coefficients; 0 for a state of zeros */

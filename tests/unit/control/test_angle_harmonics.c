@@ -149,6 +149,20 @@ void test_the_faster_correction_is_damped(void)
 /* Uncorrected samples through (AT-20), (AT-11) and (AT-12) in double precision, at a speed of the larger gain. The
  * fixed point rounds each step by up to 1/2 LSB and sine and cosine to 2^-15: 100 steps of up to 5e5 LSB of d/16 have
  * an error of 16 LSB each. */
+/* No value is older than 16 steps: the mean age of 8.5 steps is the delay for which (AT-11) has its gain. */
+void test_a_step_renews_four_parts_a_quarter_of_a_turn_apart(void)
+{
+    for (unsigned step = 0; step < 16U; step++) {
+        for (unsigned part = 0; part < ANGLE_HARMONICS_PARTS; part++) {
+            table[part] = 12345;
+        }
+        angle_harmonics_step(&config, &state, 0, table);
+        for (unsigned part = 0; part < ANGLE_HARMONICS_PARTS; part++) {
+            TEST_ASSERT_EQUAL_INT32((part % 16U == step) ? 0 : 12345, table[part]);
+        }
+    }
+}
+
 /* The place in the table has no seal: a value that the memory has changed must not lead behind the table. */
 void test_a_damaged_place_stays_in_the_table(void)
 {

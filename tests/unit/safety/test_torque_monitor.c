@@ -322,11 +322,13 @@ void test_the_lag_of_the_tracked_speed_is_known_beyond_a_count(void)
             TEST_ASSERT_EQUAL_INT(beyond, torque_monitor_lag(&config, &state, (q15_t)tracked));
         }
     }
-    /* 0.44 of the flux base: 120/32768 of the speed base are 52.8 of 53. */
-    const dq_q15_t psi = {14418, 0};
-    TEST_ASSERT_FALSE(torque_monitor_is_behind(&config, 120, psi));
-    TEST_ASSERT_TRUE(torque_monitor_is_behind(&config, 124, psi));
-    TEST_ASSERT_TRUE(torque_monitor_is_behind(&config, -124, psi));
+    /* 0.44 of the flux base, on both axes: 120/32768 of the speed base omit 52.8, and 124/32768 omit 54.6. */
+    const dq_q15_t psi = {-8651, 11534};
+    TEST_ASSERT_EQUAL_INT(0, torque_monitor_missing_voltage(0, psi));
+    TEST_ASSERT_EQUAL_INT(53, torque_monitor_missing_voltage(120, psi));
+    TEST_ASSERT_EQUAL_INT(1, torque_monitor_missing_voltage(1, (dq_q15_t){0, 24576})); /* 0.75, rounded */
+    TEST_ASSERT_EQUAL_INT(55, torque_monitor_missing_voltage(124, psi));
+    TEST_ASSERT_EQUAL_INT(55, torque_monitor_missing_voltage(-124, psi));
 }
 
 void test_nothing_is_checked_while_the_bridge_is_off_or_has_just_been_switched_on(void)
