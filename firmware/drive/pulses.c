@@ -7,7 +7,7 @@
  * zero at once. */
 static int32_t first_sign(const pulses_axis_config_t *config)
 {
-    return (config->v == 0) ? 0 : (config->high >= -config->low) ? 1 : -1;
+    return (config->high >= -config->low) ? 1 : -1;
 }
 
 static void begin(const pulses_config_t *config, pulses_state_t *state, dq_q15_t i, uint32_t theta)
@@ -39,7 +39,7 @@ static int32_t next_sign(const pulses_axis_t *axis, int32_t low, int32_t high)
     if (axis->sign > 0 && axis->i_next + change >= high) {
         return -1;
     }
-    return (axis->sign < 0 && axis->i_next - change <= low) ? 1 : axis->sign;
+    return (axis->i_next - change <= low) ? 1 : axis->sign;
 }
 
 /* The first half wave ends at a share of the bound. */
@@ -139,7 +139,7 @@ static dq_q15_t pulse(const pulses_config_t *config, pulses_state_t *state, uint
 /* One axis on its way to zero: in the last period the voltage is reduced so that the current ends at zero. */
 static int32_t axis_to_zero(pulses_axis_t *axis, int32_t v)
 {
-    if (axis->sign == 0 || v == 0 || axis->sign * axis->i_next >= 0) {
+    if (axis->sign * axis->i_next >= 0) {
         axis->sign = 0;
         return 0;
     }
@@ -155,7 +155,7 @@ static int32_t axis_to_zero(pulses_axis_t *axis, int32_t v)
 static dq_q15_t return_to_zero(const pulses_config_t *config, pulses_state_t *state)
 {
     const dq_q15_t v = {axis_to_zero(&state->d, config->d.v), axis_to_zero(&state->q, config->q.v)};
-    if (state->d.sign == 0 && state->q.sign == 0 && v.d == 0 && v.q == 0) {
+    if (v.d == 0 && v.q == 0) {
         state->phase = (state->failure == PULSES_GOOD) ? PULSES_DONE : PULSES_FAILED;
     }
     return v;

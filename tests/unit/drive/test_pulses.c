@@ -212,6 +212,208 @@ void test_an_axis_that_has_not_begun_gets_the_voltage_of_one_period_at_most_on_t
     TEST_ASSERT_TRUE(largest_q < 401.0);
 }
 
+/* Steps with given currents, in place of the machine. */
+static void gives(int32_t i_d_lsb, int32_t i_q_lsb, int32_t v_d, int32_t v_q)
+{
+    const dq_q15_t v = pulses_step(&config, &state, (dq_q15_t){i_d_lsb, i_q_lsb}, theta);
+    TEST_ASSERT_EQUAL_INT32(v_d, v.d);
+    TEST_ASSERT_EQUAL_INT32(v_q, v.q);
+}
+
+static void alternate_q(uint16_t reversals)
+{
+    config.d.v = 0;
+    config.q = (pulses_axis_config_t){.v = 4000, .low = -100, .high = 100};
+    config.first = Q15(1.0);
+    config.reversals = reversals;
+}
+
+void test_the_first_direction_is_towards_the_bound_that_is_further_from_zero(void)
+{
+    config.d = (pulses_axis_config_t){.v = 4000, .low = -12000, .high = -8000};
+    config.q = (pulses_axis_config_t){.v = 3000, .low = -8000, .high = 8000};
+    gives(0, 0, -4000, 3000);
+}
+
+/* The current does not change, so that nothing is added to it. */
+void test_the_voltage_reverses_at_the_bound_and_not_a_step_earlier(void)
+{
+    config.d = (pulses_axis_config_t){.v = 4000, .low = -50, .high = 100};
+    gives(99, 0, 4000, 0);
+    gives(99, 0, 4000, 0);
+    gives(99, 0, 4000, 0);
+    gives(100, 0, -4000, 0);
+    setUp();
+    config.d = (pulses_axis_config_t){.v = 4000, .low = -50, .high = 100};
+    gives(100, 0, 4000, 0);
+    gives(100, 0, -4000, 0);
+    gives(-49, 0, -4000, 0); /* 149 against the voltage that acts */
+    gives(-49, 0, -4000, 0);
+    gives(-49, 0, -4000, 0);
+    setUp();
+    config.d = (pulses_axis_config_t){.v = 4000, .low = -50, .high = 100};
+    gives(100, 0, 4000, 0);
+    gives(100, 0, -4000, 0);
+    gives(-50, 0, 4000, 0);
+}
+
+/* The change to be expected, 20 in a period, fits into neither direction of a band of 20. */
+void test_in_a_narrow_band_the_voltage_alternates(void)
+{
+    config.d = (pulses_axis_config_t){.v = 4000, .low = -10, .high = 10};
+    gives(0, 0, 4000, 0);
+    gives(0, 0, 4000, 0);
+    gives(30, 0, -4000, 0);
+    gives(20, 0, -4000, 0);
+    gives(10, 0, 4000, 0);
+}
+
+/* After the second reversal: 90 + 90 + 90 + 100 - 100 = 270 for the sum. It ends only when the current is positive. */
+void test_the_last_half_wave_has_the_sign_of_its_voltage(void)
+{
+    alternate_q(3);
+    gives(0, 0, 0, 4000);
+    gives(0, 90, 0, 4000);
+    gives(0, 90, 0, 4000);
+    gives(0, 90, 0, 4000);
+    gives(0, 100, 0, -4000);
+    gives(0, -100, 0, 4000);
+    gives(0, -20, 0, 4000);
+    gives(0, 0, 0, 4000);
+    TEST_ASSERT_EQUAL_INT(PULSES_PULSE, state.phase);
+    gives(0, 1, 0, -4000);
+    TEST_ASSERT_EQUAL_INT(PULSES_BACK, state.phase);
+}
+
+/* 100 - 30 - 20 is as much as the half wave of -30 - 20, which the way back repeats. */
+void test_the_last_half_wave_ends_when_twice_its_sum_balances_the_first(void)
+{
+    alternate_q(2);
+    gives(0, 0, 0, 4000);
+    gives(0, 0, 0, 4000);
+    gives(0, 100, 0, -4000);
+    gives(0, -30, 0, -4000);
+    gives(0, -20, 0, 4000);
+    TEST_ASSERT_EQUAL_INT(PULSES_BACK, state.phase);
+}
+
+void test_two_equal_currents_belong_to_one_half_wave(void)
+{
+    alternate_q(2);
+    gives(0, 0, 0, 4000);
+    gives(0, 0, 0, 4000);
+    gives(0, 100, 0, -4000);
+    gives(0, -30, 0, -4000);
+    gives(0, -30, 0, 4000);
+    TEST_ASSERT_EQUAL_INT(PULSES_BACK, state.phase);
+}
+
+void test_q_begins_after_its_delay(void)
+{
+    config.q.v = 3000;
+    config.delay = 2;
+    gives(0, 0, 8000, 0);
+    gives(0, 0, 8000, 0);
+    gives(0, 0, 8000, 3000);
+}
+
+void test_the_square_of_the_current_may_reach_its_limit(void)
+{
+    config.square_max = 25;
+    gives(3, 4, 8000, 0);
+    TEST_ASSERT_EQUAL_INT(PULSES_GOOD, state.failure);
+    gives(3, 5, -8000, 0);
+    TEST_ASSERT_EQUAL_INT(PULSES_CURRENT, state.failure);
+}
+
+static void assert_moves(uint32_t angle, pulses_failure_t failure)
+{
+    setUp();
+    gives(0, 0, 8000, 0);
+    theta += angle;
+    (void)pulses_step(&config, &state, (dq_q15_t){0, 0}, theta);
+    TEST_ASSERT_EQUAL_INT(failure, state.failure);
+}
+
+void test_the_rotor_may_move_by_the_largest_angle_in_both_directions(void)
+{
+    assert_moves(1000000U, PULSES_GOOD);
+    assert_moves(1000001U, PULSES_MOVED);
+    assert_moves(0U - 1000000U, PULSES_GOOD);
+    assert_moves(0U - 1000001U, PULSES_MOVED);
+    assert_moves(0U, PULSES_GOOD);
+}
+
+/* Each axis by its own current: a positive one needs a negative voltage. */
+void test_the_way_back_is_against_the_current_of_each_axis(void)
+{
+    config.q.v = 3000;
+    gives(1, 500, 8000, 3000);
+    theta += 1000001U;
+    gives(1, 500, -8000, -3000);
+    setUp();
+    config.q.v = 3000;
+    gives(0, -500, 8000, 3000);
+    theta += 1000001U;
+    gives(0, -500, 8000, 3000);
+}
+
+/* 80 are left at a fall of 80 per period, which needs the whole voltage; at the end 10 at a fall of 40, which needs a
+ * quarter of it. What remains then is left alone. */
+void test_the_last_voltage_is_reduced_and_nothing_follows(void)
+{
+    config.q.v = 3000;
+    gives(300, 9000, 8000, 3000);
+    theta += 1000001U;
+    gives(300, 9000, -8000, -3000);
+    gives(240, 9000, -8000, -3000);
+    gives(160, 9000, -8000, -3000);
+    gives(120, 9000, -8000, -3000);
+    gives(90, 9000, -8000, -3000);
+    gives(50, 9000, -2000, -3000);
+    gives(45, 9000, 0, -3000);
+    gives(-45, 9000, 0, -3000);
+}
+
+void test_an_axis_that_has_crossed_zero_gets_no_more_voltage(void)
+{
+    config.q.v = 3000;
+    gives(100, 9000, 8000, 3000);
+    theta += 1000001U;
+    gives(100, 9000, -8000, -3000);
+    gives(-10, 9000, 0, -3000);
+    gives(5, 9000, 0, -3000);
+    TEST_ASSERT_EQUAL_INT(PULSES_BACK, state.phase);
+}
+
+/* Noise on an axis without voltage cannot be brought to zero. */
+void test_an_axis_without_voltage_does_not_delay_the_end(void)
+{
+    gives(0, 50, 8000, 0);
+    theta += 1000001U;
+    gives(0, 50, 8000, 0);
+    gives(0, 50, 0, 0);
+    TEST_ASSERT_EQUAL_INT(PULSES_FAILED, state.phase);
+}
+
+void test_the_pulses_end_when_both_axes_are_at_zero(void)
+{
+    config.q.v = 3000;
+    gives(0, 500, 8000, 3000);
+    theta += 1000001U;
+    gives(0, 500, 8000, -3000);
+    gives(0, 400, 0, -3000);
+    TEST_ASSERT_EQUAL_INT(PULSES_BACK, state.phase);
+}
+
+void test_without_a_new_number_nothing_begins(void)
+{
+    state = (pulses_state_t){.phase = PULSES_IDLE};
+    config.number = 0;
+    gives(7, 7, 0, 0);
+    TEST_ASSERT_EQUAL_INT(PULSES_IDLE, state.phase);
+}
+
 /* 0.6 of the dc voltage is the largest one: 0.5 and -0.25 of it at half of the voltage base are 0.15 and -0.075. */
 void test_the_voltage_of_the_pulses_is_their_share_of_the_largest_one(void)
 {
