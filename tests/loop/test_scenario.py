@@ -217,6 +217,8 @@ def test_the_defaults_are_a_nominal_drive() -> None:
     [
         ('motor = "hsm1"\nduration_s = 1e-9', "record_every_s = 0.001 s: no row in the window"),
         ('motor = "hsm1"\nduration_s = 3e-4', "no row in the window 0 to 0.0003 s"),
+        (HEAD + "record_every_s = 1e-9", "record_every_s = 1e-09 s, allowed: from 0.0001 s (a PWM period)"),
+        (HEAD + "record_every_s = 9.9e-5", "record_every_s = 9.9e-05 s, allowed: from 0.0001 s (a PWM period)"),
         (HEAD + "record_every_s = 0.06", "record_every_s = 0.06 s: no row"),
         (HEAD + "record_every_s = 1e9", "record_every_s = 1e+09 s: no row"),
         (HEAD + "[window]\nfrom_s = 0.04\nto_s = 0.0402", "no row in the window 0.04 to 0.0402 s"),
@@ -249,7 +251,6 @@ def test_a_row_without_a_number_is_refused_with_its_column() -> None:
         'motor = "hsm1"\nduration_s = 1e-4\nrecord_every_s = 1e-4',
         HEAD + "record_every_s = 0.05",
         HEAD + "[window]\nfrom_s = 0.049\nto_s = 0.05",
-        HEAD + "record_every_s = 1e-9",
     ],
 )
 def test_a_window_of_one_row_has_a_mean(hsm1: Motor, text: str) -> None:

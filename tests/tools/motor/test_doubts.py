@@ -12,7 +12,8 @@ import pytest
 from conftest import MOTORS, plane, saturating, straight
 
 from fluxtrue_tools.errors import FluxtrueError
-from fluxtrue_tools.motor import doubts
+from fluxtrue_tools.motor import advice, doubts
+from fluxtrue_tools.motor.config import MotorConfig
 from fluxtrue_tools.motor.motor import load_motor
 
 TESTED = Path(__file__).resolve().parents[2] / "motors"
@@ -176,7 +177,7 @@ def test_a_map_with_more_detail_than_the_tables_is_warned_of(write: Write) -> No
     assert any(text.startswith(("current references: torque", "flux tables: torque")) for text in warned), warned
 
 
-@pytest.mark.parametrize("name", ["hsm1_8kHz", "leaf", "pmasynrm", "truck", "ebike"])
+@pytest.mark.parametrize("name", MEANT)
 def test_a_top_speed_in_rad_per_s_is_noticed_in_spite_of_field_weakening(name: str) -> None:
     loaded = load_motor(TESTED / name)
     rpm = loaded.config.machine.speed_max_rpm
@@ -227,6 +228,20 @@ def test_what_does_not_fit_is_said_in_the_users_keys_and_the_value_offered_is_ac
         fixed.setdefault(section, {})[name] = float(value)
         load_motor(write(**fixed))
     assert "-1 to 1" not in text
+
+
+def test_the_nearest_accepted_value_is_offered_where_accepted_values_have_gaps(write: Write) -> None:
+    """As hsm1 at 5 rpm: 12.2 to 14.4 rpm fit, 14.4 to 16.6 rpm do not, from there on all do."""
+    config = load_motor(write()).config
+    slow = advice.changed(config, "machine.speed_max_rpm", 5.0)
+    assert slow is not None
+
+    def fits(tried: MotorConfig) -> None:
+        if not (12.13 <= tried.machine.speed_max_rpm <= 14.4 or tried.machine.speed_max_rpm >= 16.6):
+            raise FluxtrueError("does not fit")
+
+    text = advice.advice(slow, fits, fits)
+    assert text == "machine.speed_max_rpm = 5 rpm, allowed: from 12.2 rpm"
 
 
 @pytest.mark.parametrize("pole_pairs", [3, 4])

@@ -102,6 +102,36 @@ def test_a_model_of_syre_becomes_a_motor(tmp_path: Path, importer: Importer, axe
     assert done.changes.source == "the file's own" and done.changes.worst(done.changes.torque) < 2e-4
 
 
+@pytest.mark.parametrize("write", [mat5, mat73])
+def test_a_machine_of_an_older_syre_has_other_names(tmp_path: Path, write: Callable[..., Path]) -> None:
+    """Before MMM_back_compatibility.m renames them, the maps are fdfq and ironLoss."""
+    maps = syre_model("PM")["motorModel"]
+    old = {"data": maps["data"], "fdfq": maps["FluxMap_dq"], "ironLoss": maps["IronPMLossMap_dq"]}
+    raw = syre(write(tmp_path / "motor.mat", {"motorModel": old}))
+    assert sorted_table(raw) == pytest.approx(OURS, rel=1e-12, abs=1e-12)
+    assert raw.facts["machine.pole_pairs"] == POLE_PAIRS
+    assert raw.losses is not None and np.isfinite(raw.losses.loss_W).all()
+
+
+def test_maps_of_syre_over_two_vectors_have_i_q_from_row_to_row(tmp_path: Path) -> None:
+    """As interp2(Id, Iq, Fd), with which SyR-e reads its maps, takes vectors: no option can say so."""
+    maps = syre_model("PM")["motorModel"]["FluxMap_dq"]
+    maps |= {"Id": maps["Id"][0], "Iq": maps["Iq"][:, :1]}
+    assert sorted_table(syre(mat5(tmp_path / "map.mat", maps))) == pytest.approx(OURS, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("write", [mat5, mat73])
+@pytest.mark.parametrize("without", ["motorModel", "dataSet"])
+def test_a_machine_of_syre_without_a_map_is_refused_in_its_words(
+    tmp_path: Path, without: str, write: Callable[..., Path]
+) -> None:
+    """MMM_load.m makes empty arrays of the maps; a design has only dataSet, geo, per and mat."""
+    empty = {"data": {"p": 4.0}, "FluxMap_dq": np.zeros((0, 0)), "IronPMLossMap_dq": np.zeros((0, 0))}
+    tree = {"motorModel": empty} if without == "motorModel" else {"dataSet": {"NumOfPolePairs": 4.0}}
+    with pytest.raises(FluxtrueError, match="has no dq flux map yet"):
+        syre(write(tmp_path / "motor.mat", tree))
+
+
 def test_maps_of_syre_by_themselves_need_their_axes(tmp_path: Path) -> None:
     maps = syre_model("SR")["motorModel"]["FluxMap_dq"]
     raw = syre(mat5(tmp_path / "fdfq_idiq_n256.mat", maps))

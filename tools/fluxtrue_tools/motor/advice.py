@@ -2,7 +2,8 @@
 """A derived number that does not fit the firmware, reported by the user's keys with the values that would be accepted.
 
 Which keys a number depends on, and how, is found by trying: each key alone is moved away from its value until the
-number fits, the edge is found by halving, and what is offered has been accepted once by all that motor build does.
+number fits, the first accepted value on the way is found in smaller steps, its edge by halving, and what is offered has
+been accepted once by all that motor build does.
 """
 
 import math
@@ -27,6 +28,8 @@ KEYS = (
     "machine.r_ohm",
 )  # fmt: skip
 FACTORS = (1.0005, 1.002, 1.01, 1.03, 1.1, 1.3, 1.6, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 1e4)
+GAP = 1.05  # ratio of the factors tried below the first accepted one: what is accepted may have gaps
+GAPS_MOST = 60
 HALVINGS = 24
 SHOWN = 3
 Test = Callable[[MotorConfig], object]  # raises FluxtrueError where the configuration does not fit
@@ -80,21 +83,28 @@ def _rounded(now: float, value: float) -> float:
     return (math.floor(whole + 1e-9) if value < now else math.ceil(whole - 1e-9)) * step
 
 
+def _bracket(accepts: Callable[[float], bool], whole: float) -> tuple[float, float]:
+    """Logarithms of a refused factor and of the next accepted one, the first below an accepted one."""
+    count = min(math.ceil(whole / math.log(GAP)), GAPS_MOST)
+    first = next(k for k in range(1, count + 1) if k == count or accepts(whole * k / count))
+    return whole * (first - 1) / count, whole * first / count
+
+
 def _nearest(test: Test, config: MotorConfig, key: str, now: float, up: bool) -> float | None:
     """The accepted value nearest to the present one, in one direction."""
-    last = 1.0
-    for factor in FACTORS:
-        if _passes(test, config, key, now * (factor if up else 1.0 / factor)):
-            break
-        last = factor
-    else:
+    sign = 1.0 if up else -1.0
+
+    def accepts(exponent: float) -> bool:
+        return _passes(test, config, key, now * math.exp(sign * exponent))
+
+    found = next((math.log(factor) for factor in FACTORS if accepts(math.log(factor))), None)
+    if found is None:
         return None
-    outside, inside = math.log(last), math.log(factor)
+    outside, inside = _bracket(accepts, found)
     for _ in range(HALVINGS):
         middle = 0.5 * (outside + inside)
-        value = now * math.exp(middle if up else -middle)
-        outside, inside = (outside, middle) if _passes(test, config, key, value) else (middle, inside)
-    return _rounded(now, now * math.exp(inside if up else -inside))
+        outside, inside = (outside, middle) if accepts(middle) else (middle, inside)
+    return _rounded(now, now * math.exp(sign * inside))
 
 
 def _changes(config: MotorConfig, test: Test) -> Iterator[Change]:

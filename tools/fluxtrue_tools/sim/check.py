@@ -130,6 +130,8 @@ def refused(error: lib.LoopError, scenario: Scenario, motor: Motor, where: str) 
 def rows(scenario: Scenario, period_s: float, columns: int, where: str) -> int:
     """PWM periods per row; the window must have a row to average, and all of them must fit the memory."""
     wanted, (first, last) = scenario.record_every_s, scenario.averaged()
+    if wanted < period_s * (1.0 - ROUNDING):
+        raise FluxtrueError(f"{where}: record_every_s = {wanted:g} s, allowed: from {period_s:g} s (a PWM period)")
     every = max(1, round(min(wanted, 2.0 * scenario.duration_s) / period_s))
     row_s = every * period_s
     whole = round(scenario.duration_s / period_s) // every

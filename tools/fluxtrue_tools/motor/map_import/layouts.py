@@ -2,9 +2,10 @@
 """Where other programs keep a flux map in their files.
 
 - SyR-e (github.com/SyR-e/syre_public, commit 736d008: mfiles/syreMMM/MMM_load.m, MMM_load_fdfq.m, MMM_save_fdfq.m,
-  MMM_sr2pm.m, MMM_defaultMotorModel.m, calcIronLoss.m): `motorModel.FluxMap_dq` with Id, Iq, Fd, Fq, T and
-  `motorModel.data` with axisType, p, Rs, tempCu, Imax, nmax, Vdc, J; or the same five arrays by themselves
-  (fdfq_idiq_n256.mat). Peak values, T = 1.5 p (Fd Iq - Fq Id); axisType SR is d along the larger inductance.
+  MMM_sr2pm.m, MMM_defaultMotorModel.m, MMM_back_compatibility.m, calcIronLoss.m): `motorModel.FluxMap_dq` (formerly
+  `fdfq`) with Id, Iq, Fd, Fq, T and `motorModel.data` with axisType, p, Rs, tempCu, Imax, nmax, Vdc, J; or the same
+  five arrays by themselves (fdfq_idiq_n256.mat). A map that is not computed yet is an empty array. Peak values,
+  T = 1.5 p (Fd Iq - Fq Id); Iq changes from row to row (meshgrid); axisType SR is d along the larger inductance.
 - motulator (github.com/Aalto-Electric-Drives/motulator, motulator/drive/utils): complex i_s_dq, psi_s_dq and tau_M of
   its MagneticModel, i_s, psi_s, tau_M up to version 0.5, or the real arrays id_map, iq_map, psid_map, psiq_map of its
   measured example. Peak values, d along the magnet.
@@ -26,6 +27,9 @@ from fluxtrue_tools.motor.map_import.arrays import Tree, array, at, load, names,
 from fluxtrue_tools.motor.map_import.source import FLUXES, PLACES, QUANTITIES, Losses, Raw, known_as, mapping, place_of
 
 COPPER_PER_K = 0.00393
+# Names of the maps of a machine, the present one and that of older files.
+SYRE_FLUXES = ("motorModel.FluxMap_dq", "motorModel.fdfq")
+SYRE_IRON = ("motorModel.IronPMLossMap_dq", "motorModel.ironLoss")
 SYRE_SPEEDS = (0.5, 1.0, 2.0)  # of the one at which SyR-e's losses were computed
 
 
@@ -84,7 +88,12 @@ def _five(path: Path, tree: Tree, prefix: str) -> dict[str, Array]:
     torque = at(tree, f"{prefix}T")
     if torque is not None and np.size(torque) == found["psi_d"].size and np.all(np.isfinite(torque)):
         found["torque"] = _real(path, tree, f"{prefix}T")
-    return _spread(path, found, None)
+    return _spread(path, found, "i_q")
+
+
+def _syre_map(tree: Tree, names_of_it: tuple[str, ...]) -> str | None:
+    """The name of a map that the file has, newest name first."""
+    return next((name for name in names_of_it if isinstance(at(tree, name), dict)), None)
 
 
 def _syre_facts(tree: Tree) -> Iterator[tuple[str, Any]]:
@@ -105,7 +114,7 @@ def _syre_facts(tree: Tree) -> Iterator[tuple[str, Any]]:
 
 def _syre_losses(path: Path, tree: Tree) -> Losses | None:
     """P = P_h (f/f0)^expH + P_c (f/f0)^expC + segPM P_pm (f/f0)^expPM of a loss map, at some speeds."""
-    prefix = "motorModel.IronPMLossMap_dq."
+    prefix = f"{_syre_map(tree, SYRE_IRON)}."
     if at(tree, f"{prefix}type") != "map" or at(tree, f"{prefix}Pfes_h") is None:
         return None
     frequency = scalar(tree, f"{prefix}f0")
@@ -129,11 +138,14 @@ def _syre_losses(path: Path, tree: Tree) -> Losses | None:
 def syre(path: Path) -> Raw:
     """SyR-e: motorModel or fdfq."""
     tree = load(path)
-    whole = at(tree, "motorModel.FluxMap_dq") is not None
-    if not whole and at(tree, "Fd") is None:
+    whole = _syre_map(tree, SYRE_FLUXES)
+    if whole is None and at(tree, "Fd") is None:
+        if at(tree, "motorModel") is not None or at(tree, "dataSet") is not None:
+            raise FluxtrueError(f"{path}: this machine of SyR-e has no dq flux map yet; wanted: one loaded or computed "
+                                "in its magnetic model manipulation, and the machine saved with it")  # fmt: skip
         raise FluxtrueError(f"{path}: neither motorModel.FluxMap_dq nor Id, Iq, Fd, Fq; wanted: a file of SyR-e's "
                             "magnetic model manipulation")  # fmt: skip
-    quantities = _five(path, tree, "motorModel.FluxMap_dq." if whole else "")
+    quantities = _five(path, tree, "" if whole is None else f"{whole}.")
     phases = scalar(tree, "motorModel.data.n3phase") or 1.0
     if phases != 1.0:
         raise FluxtrueError(f"{path}: motorModel.data.n3phase = {phases:g}, allowed: 1, one three-phase winding")
