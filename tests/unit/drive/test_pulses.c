@@ -375,6 +375,18 @@ void test_the_last_voltage_is_reduced_and_nothing_follows(void)
     gives(-45, 9000, 0, -3000);
 }
 
+/* The same from a negative current: 60 at a change of 90 need two thirds. */
+void test_nothing_follows_the_reduced_voltage_in_the_other_direction_either(void)
+{
+    config.q.v = 3000;
+    gives(-300, 9000, 8000, 3000);
+    theta += 1000001U;
+    gives(-300, 9000, 8000, -3000);
+    gives(-240, 9000, 8000, -3000);
+    gives(-150, 9000, 5333, -3000);
+    gives(-145, 9000, 0, -3000);
+}
+
 void test_an_axis_that_has_crossed_zero_gets_no_more_voltage(void)
 {
     config.q.v = 3000;
