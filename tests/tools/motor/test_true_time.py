@@ -110,7 +110,7 @@ COUNTS = {
     "DEVIATION_UNLIMITED": "weight of a step against deviation_steps",
     "IDENTIFY_STEPS": "windows of an update, whose rates are generated for its true time",
     "TIME_CONSTANT_SHIFT": "moves of the trim, one each trim_steps",
-    "PARTS_PER_STEP": "steps, as docs/theory/angle-tracker.md says",
+    "QUARTER": "steps that renew the whole table, as docs/theory/angle-tracker.md says",
     "ADVANCE_MIN": "angle of a step, as that page says",
     "ADVANCE_MAX": "angle of a step, as that page says",
     "ADVANCE_FAST_SHIFT": "angle of a step, as that page says",
