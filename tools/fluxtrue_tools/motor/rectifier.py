@@ -5,6 +5,7 @@ import math
 from typing import Final
 
 import numpy as np
+from scipy.optimize import brentq
 
 from fluxtrue_tools.motor.flux_model import Array, FluxModel
 
@@ -14,15 +15,11 @@ SIX_STEP: Final = 2.0 * math.sqrt(3.0) / math.pi  # line voltage's fundamental o
 
 
 def _cancelling_id_A(model: FluxModel, step_A: float) -> float:
-    """The current that cancels the magnets' flux, from below."""
+    """The current that cancels the magnets' flux."""
     low = -step_A
     while float(model.psi_d(low, 0.0)) > 0.0:
         low *= 2.0
-    high = 0.0
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if float(model.psi_d(middle, 0.0)) < 0.0 else (low, middle)
-    return low
+    return float(brentq(lambda i_d: float(model.psi_d(i_d, 0.0)), low, 0.0))
 
 
 def _orthogonal_iq_A(model: FluxModel, i_d: Array, top_A: float) -> Array:
