@@ -14,7 +14,7 @@ Found = tuple[str, str]  # key, why
 
 PAPER_GAINS = ("observer_m", "flux_bandwidth_rad_s", "resistance_bandwidth_rad_s")
 ROBUST_ONLY = ("trim",)
-TWIN_ONLY = ("plant.current_quantise", "plant.vdc_quantise")
+TWIN_ONLY = ("current_quantise", "vdc_quantise")
 MAP_INSTEAD = ("ld_H", "lq_H", "psi_f_Vs")
 ONLY_WITH_MAP = ("cross_saturation_scale",)
 SPIKE = ("angle_spike_every", "angle_spike_samples", "angle_spike_rad")
@@ -133,9 +133,9 @@ def _controller(scenario: "Scenario", plant: _Plant) -> Iterator[Found]:
         yield "controller.torque_requested_Nm", f"{scenario.profile.key('torque_Nm')} requests the torque"
     if scenario.controller.kind == "firmware":
         for name in TWIN_ONLY:
-            if name.removeprefix("plant.") in plant.given or name in plant.events:
-                yield name, ("the firmware always gets the converter's whole codes; allowed with controller.kind = "
-                             "'twin'")  # fmt: skip
+            if name in plant.given or f"plant.{name}" in plant.events:
+                yield f"plant.{name}", ("the firmware always gets the converter's whole codes; allowed with "
+                                        "controller.kind = 'twin'")  # fmt: skip
     for switch, beginnings in ONLY_WHILE.items():
         if not calibration.get(switch) and switch not in plant.events:
             for name in (name for name in calibration if name.startswith(beginnings)):
