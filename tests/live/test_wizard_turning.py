@@ -16,7 +16,19 @@ from progress import polled, until
 from selenium import webdriver
 from selenium.webdriver.common.keys import Keys
 from test_still import WIDTHS, arrive, begin, moved, shown, watch
-from test_wizard import ARRIVALS, BATCHES, FOUND, NAMEPLATE, SPEEDS_RPM, STEP_S, TORQUE_NM, Bench, begun, downloaded
+from test_wizard import (
+    ARRIVALS,
+    BATCHES,
+    FOUND,
+    NAMEPLATE,
+    SPEEDS_RPM,
+    STEP_S,
+    TORQUE_NM,
+    TORQUE_SHARE,
+    Bench,
+    begun,
+    downloaded,
+)
 
 from fluxtrue_tools.campaign.windows import Window
 from fluxtrue_tools.cli import run as command
@@ -29,7 +41,6 @@ from fluxtrue_tools.sim import motor as motors
 SEED = 101
 OFFSET_DEG, PSI_F, INERTIA, DRAG = 0.2, 0.005, 0.03, 0.1  # the bounds of tests/commission/test_bus_turning.py
 SPIN_S = 600.0  # of simulated time, for the longest step
-TORQUE_SHARE = 0.03  # 95 % of the points after a commissioning; here all of a few
 
 
 @pytest.fixture(scope="module")
