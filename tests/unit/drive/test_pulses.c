@@ -285,25 +285,27 @@ void test_the_last_half_wave_has_the_sign_of_its_voltage(void)
     TEST_ASSERT_EQUAL_INT(PULSES_BACK, state.phase);
 }
 
-/* 100 - 30 - 20 is as much as the half wave of -30 - 20, which the way back repeats. */
-void test_the_last_half_wave_ends_when_twice_its_sum_balances_the_first(void)
+/* Of two: the first has a sum of 100, the last one so far of -30. */
+static void begin_last_half_wave(void)
 {
     alternate_q(2);
     gives(0, 0, 0, 4000);
     gives(0, 0, 0, 4000);
     gives(0, 100, 0, -4000);
     gives(0, -30, 0, -4000);
+}
+
+/* 100 - 30 - 20 is as much as the half wave of -30 - 20, which the way back repeats. */
+void test_the_last_half_wave_ends_when_twice_its_sum_balances_the_first(void)
+{
+    begin_last_half_wave();
     gives(0, -20, 0, 4000);
     TEST_ASSERT_EQUAL_INT(PULSES_BACK, state.phase);
 }
 
 void test_two_equal_currents_belong_to_one_half_wave(void)
 {
-    alternate_q(2);
-    gives(0, 0, 0, 4000);
-    gives(0, 0, 0, 4000);
-    gives(0, 100, 0, -4000);
-    gives(0, -30, 0, -4000);
+    begin_last_half_wave();
     gives(0, -30, 0, 4000);
     TEST_ASSERT_EQUAL_INT(PULSES_BACK, state.phase);
 }
