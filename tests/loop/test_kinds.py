@@ -11,6 +11,7 @@ from fluxtrue_tools.campaign.machine import Machine, data_sheet
 from fluxtrue_tools.campaign.machines import FILES, KINDS
 from fluxtrue_tools.campaign.spec import Nominal, read
 from fluxtrue_tools.campaign.steps import OVERSHOOT_MAX, overshoot, steps
+from fluxtrue_tools.motor.config import SLEW_PER_TORQUE_MAX
 from fluxtrue_tools.sim.build import prepare
 from fluxtrue_tools.sim.library import Loop
 
@@ -59,12 +60,19 @@ def test_quiet_sensors_of_a_machine_at_rest_are_not_stuck(name: str) -> None:
 
 @pytest.mark.parametrize("name", MACHINES)
 def test_a_rotor_that_accelerates_by_itself_trips_no_monitor(name: str) -> None:
-    """All torque on the bare rotor up to 60 % of top speed, and back through zero."""
+    """All torque on the bare rotor up to 60 % of top speed, and back through zero.
+
+    While the torque falls to zero, at SLEW_PER_TORQUE_MAX of full torque, the rotor gains half of the speed that full
+    torque would give it. The light rotor of `servo` gains 40 % of its top speed: the reversal begins so much earlier,
+    or the rotor would rightly be found too fast.
+    """
     machine = machine_of(name)
     motor = machine.motor
     plant = {"imposed_speed": 0.0, "inertia_kgm2": motor.inertia_kgm2}
     top = 0.6 * machine.speed_max_rpm * 2.0 * math.pi / 60.0
-    run_up_s = 1.2 * top * motor.inertia_kgm2 / motor.torque_max_Nm
+    acceleration = motor.torque_max_Nm / motor.inertia_kgm2
+    run_up_s = 1.2 * top / acceleration
+    reverses = max(top - 0.5 * acceleration / SLEW_PER_TORQUE_MAX, 0.1 * top)
     with Loop(motor.library, motor.plant | plant, motor.flux_map) as loop:
         loop.set("enable", 1.0)
         loop.record(("fault_word", "truth.speed_rad_s"))
@@ -75,7 +83,7 @@ def test_a_rotor_that_accelerates_by_itself_trips_no_monitor(name: str) -> None:
                 row = loop.run(round(max(run_up_s / 50.0, 1e-3) / loop.period_s))[-1]
                 word = int(row[0])
                 assert word == 0, (torque, row[1], faults.named(word))
-                if torque * row[1] >= top:
+                if torque * row[1] >= reverses:
                     break
             else:
-                raise AssertionError(f"{row[1]:.0f} rad/s after {8 * run_up_s:.2g} s, wanted: {torque * top:.0f}")
+                raise AssertionError(f"{row[1]:.0f} rad/s after {8 * run_up_s:.2g} s, wanted: {torque * reverses:.0f}")
