@@ -12,6 +12,7 @@ from fluxtrue_tools.bench.image import Stand
 from fluxtrue_tools.emulate import build, library, preempt
 from fluxtrue_tools.emulate.build import Parts
 from fluxtrue_tools.emulate.core import Core
+from fluxtrue_tools.emulate.padding import padding
 from fluxtrue_tools.sim.library import Loop
 
 PAPER, ROBUST = 0, 1
@@ -83,12 +84,22 @@ def test_the_drive_continues_unchanged_after_these_tests(parts: Parts, loop: Loo
 # ---- interrupts that share only a flag or a queue with the control, on the image that would be flashed ----
 
 
-@pytest.fixture(scope="module", params=[PAPER, ROBUST], ids=["paper", "robust"])
-def stand(request: pytest.FixtureRequest) -> Iterator[Stand]:
-    """A drive at standstill with torque, commanded over the bus."""
+@pytest.fixture(scope="module")
+def flashed() -> Parts:
     if not have_arm_compiler():
         pytest.skip("no cross compiler: there is no image to emulate")
-    motor = build.prepare("hsm1", flashed=True).emulated(library.COUNTING)
+    return build.prepare("hsm1", flashed=True)
+
+
+@pytest.fixture(scope="module")
+def left_out(flashed: Parts) -> frozenset[int]:
+    return padding(flashed.image)
+
+
+@pytest.fixture(scope="module", params=[PAPER, ROBUST], ids=["paper", "robust"])
+def stand(flashed: Parts, request: pytest.FixtureRequest) -> Iterator[Stand]:
+    """A drive at standstill with torque, commanded over the bus."""
+    motor = flashed.emulated(library.COUNTING)
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 0.0, "vdc_V": 1.0}
     with Loop(motor.library, plant, motor.flux_map) as loop:
         stand = Stand(loop)
@@ -129,13 +140,13 @@ PAIRS = [(victim, by) for by in (preempt.GATE, preempt.CAN) for victim in VICTIM
 @pytest.mark.parametrize(("victim", "by"), PAIRS, ids=[f"{VICTIMS[v]}-{'gate' if b == preempt.GATE else 'can'}"
                                                        for v, b in PAIRS])  # fmt: skip
 def test_an_interrupt_within_an_activity_has_the_same_result_as_just_before_or_just_after_it(
-    stand: Stand, victim: int, by: int
+    stand: Stand, left_out: frozenset[int], victim: int, by: int
 ) -> None:
     if victim == preempt.MRAI and stand.loop.get("identification_mode") == ROBUST:
         pytest.skip("the robust identification has no interrupt of its own")
     with (
         restored_afterwards(stand.core),
-        preempt.interrupt_from_both_sides(stand.core, victim, by, trigger(stand, by)) as sides,
+        preempt.interrupt_from_both_sides(stand.core, victim, by, trigger(stand, by), left_out) as sides,
     ):
         assert sides.mixed == ()
         assert sides.before + sides.after == sides.instructions > 50
@@ -145,9 +156,9 @@ def test_an_interrupt_within_an_activity_has_the_same_result_as_just_before_or_j
             assert sides.same
 
 
-def test_a_gate_fault_is_latched_in_its_own_period_or_in_the_next(stand: Stand) -> None:
-    core, loop = stand.core, stand.loop
-    with preempt.interrupt_from_both_sides(core, preempt.FAST, preempt.GATE, trigger(stand, preempt.GATE)) as sides:
+def test_a_gate_fault_is_latched_in_its_own_period_or_in_the_next(stand: Stand, left_out: frozenset[int]) -> None:
+    core, loop, gate = stand.core, stand.loop, preempt.GATE
+    with preempt.interrupt_from_both_sides(core, preempt.FAST, gate, trigger(stand, gate), left_out) as sides:
         core.restore(sides.snapshot_before)
         assert loop.get("fault_word") == GATE_FAULT
         core.restore(sides.snapshot_after)
@@ -158,11 +169,13 @@ def test_a_gate_fault_is_latched_in_its_own_period_or_in_the_next(stand: Stand) 
         assert core.register("FTM0.SWOCTRL") == 0x3F  # all six outputs forced low
 
 
-def test_a_frame_that_comes_within_the_task_is_taken_by_it_or_waits_for_the_next(stand: Stand) -> None:
-    core = stand.core
+def test_a_frame_that_comes_within_the_task_is_taken_by_it_or_waits_for_the_next(
+    stand: Stand, left_out: frozenset[int]
+) -> None:
+    core, can = stand.core, preempt.CAN
     with (
         restored_afterwards(core),
-        preempt.interrupt_from_both_sides(core, preempt.TASK, preempt.CAN, trigger(stand, preempt.CAN)) as sides,
+        preempt.interrupt_from_both_sides(core, preempt.TASK, can, trigger(stand, can), left_out) as sides,
     ):
         core.restore(sides.snapshot_before)
         taken, put = core.word("taken"), core.word("put")

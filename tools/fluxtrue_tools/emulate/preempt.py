@@ -2,11 +2,12 @@
 """An activity interrupted at each of its instructions.
 
 By the fast ISR, with the host's answer for comparison: tests/target/emulator/preempt.h. By any other interrupt, with
-the image's own: everything in its memory must be as if the interrupt had come just before the activity, or just after.
+the image's own: every variable in its memory must be as if the interrupt had come just before the activity, or just
+after. Padding is left out: a structure copied from the stack takes over what the interrupt has left there.
 """
 
 import ctypes
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
@@ -103,14 +104,18 @@ class Stepper:
 
 
 @contextmanager
-def interrupt_from_both_sides(core: Core, victim: int, by: int, raise_it: Callable[[], None]) -> Iterator[Sides]:
+def interrupt_from_both_sides(
+    core: Core, victim: int, by: int, raise_it: Callable[[], None], padding: Collection[int]
+) -> Iterator[Sides]:
     """From the victim's next run on. `raise_it` makes the interrupt `by` pending. The core is left as it was.
+
+    padding: addresses that are not compared (fluxtrue_tools.emulate.padding).
 
     The rotor must stand: what the image takes away for the time since its angle was sampled depends on the delay.
     """
     snapshots = [core.save()]
     try:
-        sides = _both_sides(core, victim, by, raise_it)
+        sides = _both_sides(core, victim, by, raise_it, padding)
         snapshots += [sides.snapshot_before, sides.snapshot_after]
         yield sides
     finally:
@@ -120,16 +125,20 @@ def interrupt_from_both_sides(core: Core, victim: int, by: int, raise_it: Callab
             core.free(snapshot)
 
 
-def _both_sides(core: Core, victim: int, by: int, raise_it: Callable[[], None]) -> Sides:
+def _both_sides(core: Core, victim: int, by: int, raise_it: Callable[[], None], padding: Collection[int]) -> Sides:
     stepper = Stepper(core)
     stepper.run((victim, True))
     for pdb in ("PDB0.SC", "PDB1.SC"):
         core.set_register(pdb, 0)  # no conversions: no other period begins
     start = core.save()
     bottom = core.symbol("stack_top")
+    left_out = [address - bottom for address in padding if bottom <= address < RAM_END]
 
     def found() -> tuple[bytes, tuple[int, ...]]:
-        return core.read(bottom, RAM_END - bottom), tuple(core.register(name) for name in BRIDGE)
+        content = bytearray(core.read(bottom, RAM_END - bottom))
+        for offset in left_out:
+            content[offset] = 0
+        return bytes(content), tuple(core.register(name) for name in BRIDGE)
 
     begun = core.instructions
     stepper.run((victim, False))
