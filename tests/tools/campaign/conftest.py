@@ -18,7 +18,6 @@ motor = "hsm1"
 cases = 4
 seed = 7
 [plant]
-current_quantise = true
 angle_bits = 12
 [drive]
 duration_s = 2

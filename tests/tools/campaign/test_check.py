@@ -42,6 +42,8 @@ REFUSED = [
      "plant.ld_H: has no effect here: the motor has a flux map"),
     ("a ripple without a frequency", SMALL.replace("[plant]", "[plant]\nvdc_ripple_V = 2"),
      "plant.vdc_ripple_V: has no effect here"),
+    ("a resolution with the firmware", SMALL.replace("[plant]", "[plant]\nvdc_quantise = true"),
+     "plant.vdc_quantise: has no effect here: the firmware always gets the converter's whole codes"),
     ("a nominal value the motor has", SMALL + "[nominal]\ndevice_drop_V = 2", "nominal.device_drop_V: has no effect"),
 ]  # fmt: skip
 

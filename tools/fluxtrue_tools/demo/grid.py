@@ -22,7 +22,6 @@ WRONG: Final = {
     "dead_time_s": 2e-6,
     "current_noise_A_rms": 0.5,
     "adc_bits": 12,
-    "current_quantise": True,
     "iron_k_h": 0.0,  # the paper's identification has no iron loss in its model
     "iron_k_e": 0.0,
 }

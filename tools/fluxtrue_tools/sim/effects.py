@@ -15,6 +15,7 @@ Found = tuple[str, str]  # key, why
 PAPER_GAINS = ("observer_m", "flux_bandwidth_rad_s", "resistance_bandwidth_rad_s")
 ROBUST_ONLY = ("trim",)
 TWIN_ONLY = ("current_quantise", "vdc_quantise")
+WHOLE_CODES = "the firmware always gets the converter's whole codes"
 MAP_INSTEAD = ("ld_H", "lq_H", "psi_f_Vs")
 ONLY_WITH_MAP = ("cross_saturation_scale",)
 SPIKE = ("angle_spike_every", "angle_spike_samples", "angle_spike_rad")
@@ -107,9 +108,11 @@ def _magnet(plant: _Plant) -> Iterator[Found]:
 
 
 def of_plant(table: "Plant") -> Iterator[Found]:
-    """Fields of a plant that nothing changes later."""
+    """Fields of a plant that nothing changes later, with the firmware as its controller."""
     yield from _inverter(_Plant(table))
     yield from _magnet(_Plant(table))
+    for name in TWIN_ONLY:
+        yield f"plant.{name}", WHOLE_CODES
 
 
 def _machine(scenario: "Scenario", plant: _Plant) -> Iterator[Found]:
@@ -134,8 +137,7 @@ def _controller(scenario: "Scenario", plant: _Plant) -> Iterator[Found]:
     if scenario.controller.kind == "firmware":
         for name in TWIN_ONLY:
             if name in plant.given or f"plant.{name}" in plant.events:
-                yield f"plant.{name}", ("the firmware always gets the converter's whole codes; allowed with "
-                                        "controller.kind = 'twin'")  # fmt: skip
+                yield f"plant.{name}", f"{WHOLE_CODES}; allowed with controller.kind = 'twin'"
     for switch, beginnings in ONLY_WHILE.items():
         if not calibration.get(switch) and switch not in plant.events:
             for name in (name for name in calibration if name.startswith(beginnings)):
