@@ -74,10 +74,15 @@ static const tx_message_t *next(const can_tx_t *tx)
     return &messages[31U - fx_leading_zeros(lowest)];
 }
 
+static void drop_first(can_tx_t *tx)
+{
+    tx->pending = (uint16_t)(tx->pending & (tx->pending - 1U));
+}
+
 bool can_tx_due(can_tx_t *tx)
 {
     while (tx->pending != 0U && !is_due(tx, next(tx))) {
-        tx->pending = (uint16_t)(tx->pending & (tx->pending - 1U));
+        drop_first(tx);
     }
     return tx->pending != 0U;
 }
@@ -103,7 +108,7 @@ tx_result_t can_tx_next(can_tx_t *tx, const telemetry_t *telemetry, can_frame_t 
         return TX_NONE;
     }
     const tx_message_t *message = next(tx);
-    tx->pending = (uint16_t)(tx->pending & (tx->pending - 1U));
+    drop_first(tx);
     *frame = (can_frame_t){.id = message->id, .length = MESSAGE_LENGTH};
     if (!message->encode(telemetry, frame->data)) {
         return TX_NOT_A_NUMBER;
