@@ -17,7 +17,9 @@ VARIABLES = (
     ("volatile struct { char a; short b; } x = {1}", [1]),
     ("struct { struct { short a; char b; } inner; int c; } x[2] = {{{1}}}", [3, 11]),
     ("union { struct { char a; int b; } both; char two[2]; } x = {{1}}", [2, 3]),
-    ("struct { unsigned a : 3, b : 4; int c; } x = {1}", []),
+    ("struct { unsigned a : 3, b : 4; int c; } x = {1}", [1, 2, 3]),
+    ("struct { int c; unsigned char a : 3, b : 7; short d; } x = {1}", []),
+    ("struct { int c; unsigned a : 3; } x = {1}", [5, 6, 7]),
 )
 
 

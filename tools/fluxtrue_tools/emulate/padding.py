@@ -38,6 +38,16 @@ def _length(array: DIE) -> int:
     return count
 
 
+def _placed(member: DIE) -> tuple[int, bytes]:
+    """Offset of a member, and 1 for each of its bytes that belongs to a value; a bit field uses each that it touches."""
+    bit = member.attributes.get("DW_AT_data_bit_offset")
+    if bit is not None:
+        first, last = int(bit.value), int(bit.value) + int(member.attributes["DW_AT_bit_size"].value) - 1
+        return first // 8, b"\1" * (last // 8 - first // 8 + 1)
+    at = member.attributes.get("DW_AT_data_member_location")
+    return int(at.value) if at else 0, _used(_type(member))
+
+
 def _used(die: DIE) -> bytes:
     """1 for each byte of a type that belongs to a value, 0 for padding."""
     if die.tag == "DW_TAG_array_type":
@@ -47,9 +57,8 @@ def _used(die: DIE) -> bytes:
         return b"\1" * len(used)
     for member in die.iter_children():
         if member.tag == "DW_TAG_member":
-            at = member.attributes.get("DW_AT_data_member_location")
-            offset = int(at.value) if at else 0
-            for n, byte in enumerate(_used(_type(member)), offset):
+            offset, bytes_of_it = _placed(member)
+            for n, byte in enumerate(bytes_of_it, offset):
                 used[n] |= byte
     return bytes(used)
 
