@@ -54,3 +54,15 @@ def test_above_its_level_the_short_circuit_brakes_less() -> None:
     """A machine that generates when it is switched off goes on so at 1.06, with the torque that it had."""
     assert braking_Nm("hsm1", 1.06, OFF) > 40.0
     assert braking_Nm("hsm1", 1.06, LOWER) < 4.0
+
+
+def test_with_too_strong_a_magnet_the_braking_grows_beyond_that_of_the_short_circuit() -> None:
+    assert 4.0 < braking_Nm("paper", 1.06, OFF, STRONG) < 6.0
+    assert braking_Nm("paper", 1.06, LOWER, STRONG) > 9.0
+    assert braking_Nm("paper", 1.09, OFF, STRONG) > 15.0
+    assert braking_Nm("paper", 1.09, LOWER, STRONG) < 10.0
+
+
+def test_just_above_its_level_much_saliency_brakes_at_once() -> None:
+    assert braking_Nm("hsm1", 1.02, OFF, STRONG) > 45.0
+    assert braking_Nm("hsm1", 1.02, LOWER, STRONG) < 3.0
