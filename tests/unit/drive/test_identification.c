@@ -327,8 +327,8 @@ void test_the_compensation_changes_only_with_trim(void)
     TEST_ASSERT_GREATER_THAN_INT(dead_time(&motor.parameters), dead_time(&drive.parameters));
 }
 
-/* What is identified does not explain the voltages: it may be another error than the inverter's. The bound is a quarter;
- * until the trim reads the share, an update of the identification may have reduced it by a twentieth. */
+/* What is identified does not explain the voltages: it may be another error than the inverter's. The bound is a
+ * quarter; until the trim reads the share, an update of the identification may have reduced it by a twentieth. */
 void test_the_compensation_changes_only_while_the_residuals_agree_with_the_model(void)
 {
     identify_voltage_error(true, Q15(0.28));
