@@ -39,7 +39,8 @@ def _length(array: DIE) -> int:
 
 
 def _placed(member: DIE) -> tuple[int, bytes]:
-    """Offset of a member, and 1 for each of its bytes that belongs to a value; a bit field uses each that it touches."""
+    """Offset of a member, and 1 for each of its bytes that belongs to a value; a bit field uses each byte
+    in which it lies."""
     bit = member.attributes.get("DW_AT_data_bit_offset")
     if bit is not None:
         first, last = int(bit.value), int(bit.value) + int(member.attributes["DW_AT_bit_size"].value) - 1
