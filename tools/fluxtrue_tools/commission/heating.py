@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How long the steps last and how much they heat the windings: python -m fluxtrue_tools.commission.heating.
+
+The current is the simulated machine's own, in each PWM period, not that of the sensors. Its share is the root of the
+mean square of the current vector's magnitude over the whole step, pauses included, divided by the largest current of
+the nameplate: 1 heats the windings as that current does for as long. The time is that of the drive in software in the
+loop; over CAN most of the time passes without current, while captures are read.
+"""
+
+import contextlib
+from collections.abc import Iterator, Sequence
+
+import click
+import numpy as np
+
+from fluxtrue_tools.commission import hidden
+from fluxtrue_tools.commission.campaign import FIRST_SEED, FOLDER, KINDS
+from fluxtrue_tools.commission.cli import nameplate_of
+from fluxtrue_tools.commission.drive import Capture, SoftwareInTheLoop
+from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.steps import ALL, Step, chosen, run
+from fluxtrue_tools.motor.flux_model import Array
+from fluxtrue_tools.sim import motor as motors
+from fluxtrue_tools.sim.library import Loop
+from fluxtrue_tools.sim.motor import Motor
+
+TRUTH = ("truth.i_d_A", "truth.i_q_A")
+
+
+class Metered(SoftwareInTheLoop):
+    """Adds up time and squared current of the machine; what a commissioning sees of the drive is unchanged."""
+
+    def __init__(self, loop: Loop) -> None:
+        super().__init__(loop)
+        self.seconds, self.square_A2s = 0.0, 0.0
+
+    def capture(self, names: Sequence[str], periods: int) -> Array:
+        """As SoftwareInTheLoop.capture()."""
+        self._loop.record([self._allowed(name) for name in names] + list(TRUTH))
+        rows = self._loop.run(periods)
+        self.seconds += periods * self.period_s
+        self.square_A2s += float(np.square(rows[:, -2:]).sum()) * self.period_s
+        self.passed(periods * self.period_s)
+        return rows[:, :-2]
+
+
+def measure(name: str, seed: int, motor: Motor, known: Nameplate) -> dict[str, tuple[float, float]]:
+    """Of each step of a machine with an unknown connection, and of all: seconds, share of the largest current."""
+    _, flux_map, plant = hidden.draw(name, seed, motor, known.i_max_A, connected=False)
+    drive = Metered(Loop(motor.library, plant, flux_map))
+    of_steps: dict[str, tuple[float, float]] = {}
+
+    def share(seconds: float, square_A2s: float) -> float:
+        return float(np.sqrt(square_A2s / seconds)) / known.i_max_A
+
+    @contextlib.contextmanager
+    def metered(_: Capture, step: Step) -> Iterator[None]:
+        seconds, square_A2s = drive.seconds, drive.square_A2s
+        yield
+        lasted = drive.seconds - seconds
+        of_steps[step.name] = (lasted, share(lasted, drive.square_A2s - square_A2s))
+
+    run(drive, chosen((ALL,)), known, lambda _: None, shown=metered)
+    return of_steps | {ALL: (drive.seconds, share(drive.seconds, drive.square_A2s))}
+
+
+@click.command()
+@click.option("--machines", type=click.IntRange(min=1), default=len(KINDS), show_default=True)
+def main(machines: int) -> None:
+    """Time and heating of hidden machines, and the worst of each step."""
+    motor = motors.load(str(FOLDER))
+    known = nameplate_of(FOLDER, motor)
+    found = []
+    for k in range(machines):
+        name, seed = KINDS[k % len(KINDS)], FIRST_SEED + k
+        found.append(measure(name, seed, motor, known))
+        click.echo(f"{name:10} {seed}  " + "  ".join(f"{step} {s:.1f} s {share:.2f}"
+                                                     for step, (s, share) in found[-1].items()))  # fmt: skip
+    for step in found[0]:
+        seconds, share = np.array([each[step] for each in found]).T
+        click.echo(f"{step:10}  median {np.median(seconds):.1f} s, longest {seconds.max():.1f} s, at most "
+                   f"{share.max():.2f} i_max rms")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
