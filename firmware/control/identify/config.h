@@ -26,6 +26,9 @@ typedef enum {
     IDENTIFY_STATES
 } identify_index_t;
 
+/** The tables' flux changes with this state and those behind it; beside them only the magnet's flux changes psi. */
+#define IDENTIFY_FIRST_OF_TABLES IDENTIFY_LQ
+
 typedef struct {
     uint8_t l_shift;           /* of the flux tables */
     q31_t r0;                  /* at 20 C */

@@ -49,7 +49,7 @@ static void jacobian_rows(const identify_config_t *config, const identify_point_
     const dq_q15_t i = {fx_q15_from_q31(point->i.d), fx_q15_from_q31(point->i.q)};
     const int32_t magnitude = fx_magnitude(i.d, i.q);
     const int32_t length = fx_max_s32(magnitude, config->i_smooth);
-    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+    for (unsigned j = IDENTIFY_FIRST_OF_TABLES; j < IDENTIFY_STATES; j++) {
         m->now.d.h_q30[j] = -identify_mul(w, m->psi_q.h_q30[j]);
         m->now.q.h_q30[j] = identify_mul(w, m->psi_d.h_q30[j]);
     }
