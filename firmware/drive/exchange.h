@@ -6,6 +6,7 @@
  *   samples has more slots: it is the history that the scope captures from.
  *   From task to ISR, the writer cannot interrupt the reader: one read is enough.
  *   From fast ISR to task, it can: the task copies all it needs, and repeats the copy if a period has interrupted it.
+ *   Who needs nothing but one sample reads it in place, because its slot is written again only 64 periods later.
  *   The paper's identification has a box of its own (drive/mrai).
  * Source   docs/architecture.md, shared data; one core, the writer always completes before a lower priority resumes
  * Units    per unit of motor.bases; angles in turns times 2^32
@@ -113,26 +114,15 @@ static inline uint32_t sample_box_publish(sample_box_t *box)
     return generation;
 }
 
-static inline sample_t sample_box_read(const sample_box_t *box)
-{
-    sample_t copy;
-    uint32_t seen;
-    do {
-        seen = box->generation;
-        exchange_barrier();
-        copy = box->slot[seen % SAMPLE_SLOTS];
-        exchange_barrier();
-    } while (box->generation - seen > 1U);
-    return copy;
-}
-
-/* In place: a reader that the fast ISR may interrupt must copy it and then compare the generation again. */
+/* In place. A reader that combines it with other data of the same period must copy all of them and then compare the
+ * generation again. */
 static inline const sample_t *sample_box_at(const sample_box_t *box, uint32_t generation)
 {
     return &box->slot[generation % SAMPLE_SLOTS];
 }
 
-/* For one word of it: the fast ISR needs SAMPLE_SLOTS - 1 periods to come back to this slot. */
+/* In place: the fast ISR needs SAMPLE_SLOTS - 1 periods to come back to this slot, far longer than reading it takes. A
+ * second call may return a later sample. */
 static inline const sample_t *sample_box_last(const sample_box_t *box)
 {
     return sample_box_at(box, box->generation);

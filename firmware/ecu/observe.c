@@ -142,8 +142,8 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
 {
     const drive_t *drive = &ecu->drive;
     const bus_command_t *command = &ecu->rx.command;
-    const sample_t sample = sample_box_read(&drive->samples);
-    const float v_dc_V = si_from_q15(sample.v_dc, drive->motor->bases.voltage_V);
+    const sample_t *sample = sample_box_last(&drive->samples);
+    const float v_dc_V = si_from_q15(sample->v_dc, drive->motor->bases.voltage_V);
     const q15_t torque_requested = per_unit(ecu, command->torque_requested_Nm);
     const battery_voltage_in_t voltages = battery_voltage(ecu, v_dc_V);
     return (supervisor_in_t){
@@ -156,12 +156,12 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
         .reset = command->fault_reset,
         .torque_requested_is_zero = fx_abs_q15(torque_requested) <= ecu->arbitration_config.dead_band,
         .torque_arbitrated_is_zero = ecu->arbitration_state.torque_arbitrated == 0,
-        .dc_in_range = sample.v_dc >= drive->motor->monitor.v_min && sample.v_dc <= drive->motor->monitor.v_max,
-        .dc_settled = is_dc_settled(ecu, sample.v_dc),
+        .dc_in_range = sample->v_dc >= drive->motor->monitor.v_min && sample->v_dc <= drive->motor->monitor.v_max,
+        .dc_settled = is_dc_settled(ecu, sample->v_dc),
         .dc_safe = v_dc_V < TOUCH_SAFE_V,
         .dc_near_battery = battery_voltage_is_near(&voltages),
         .dc_contradicts = battery_voltage_contradicts(&ecu->battery_voltage, &voltages),
-        .sensors_plausible = are_sensors_plausible(drive, &sample),
+        .sensors_plausible = are_sensors_plausible(drive, sample),
         .angle_absolute = hal_angle_is_absolute(),
         .angle_imposed = drive_imposes_angle(drive),
         .slow = is_slow(drive),

@@ -54,9 +54,9 @@ static void read_temperatures(telemetry_t *t)
 
 void telemetry_read(const drive_t *drive, const can_tx_t *tx, telemetry_t *telemetry)
 {
-    const sample_t sample = sample_box_read(&drive->samples);
+    const sample_t *sample = sample_box_last(&drive->samples);
     telemetry->scales = &drive->motor->bus_scales;
-    read_point(drive, &sample, telemetry);
+    read_point(drive, sample, telemetry);
     read_torque(drive, telemetry);
     if (can_tx_may_send_identification(tx)) {
         read_identification(drive, telemetry);

@@ -83,7 +83,7 @@ static bool at_rest(const drive_t *drive)
 {
     return drive->task.run_state == RUN_STATE_OFF && drive->fast.faults == 0U &&
            command_box_read(&drive->commands)->safe != SAFE_SHORT_CIRCUIT &&
-           drive_stands_still(sample_box_read(&drive->samples).point.omega);
+           drive_stands_still(sample_box_last(&drive->samples)->point.omega);
 }
 
 /* A save is wanted as soon as the drive has rested for long enough. */

@@ -950,9 +950,9 @@ void test_a_sample_is_not_read_before_it_is_published(void)
     sample_at(0.1, true, false);
     sample_t *next = sample_box_begin(&drive.samples);
     next->v_dc = 77;
-    TEST_ASSERT_EQUAL_INT(21238, sample_box_read(&drive.samples).v_dc);
+    TEST_ASSERT_EQUAL_INT(21238, sample_box_last(&drive.samples)->v_dc);
     sample_box_publish(&drive.samples);
-    TEST_ASSERT_EQUAL_INT(77, sample_box_read(&drive.samples).v_dc);
+    TEST_ASSERT_EQUAL_INT(77, sample_box_last(&drive.samples)->v_dc);
 }
 
 void test_the_boxes_survive_the_wrap_of_their_generation(void)
@@ -962,7 +962,7 @@ void test_the_boxes_survive_the_wrap_of_their_generation(void)
     drive.mrai.schedules.generation = UINT32_MAX - 2U;
     for (int n = 0; n < 6; n++) {
         sample_at(0.01 * n, true, false);
-        TEST_ASSERT_EQUAL_INT32((q31_t)(0.01 * n * 2147483647.0), sample_box_read(&drive.samples).point.omega);
+        TEST_ASSERT_EQUAL_INT32((q31_t)(0.01 * n * 2147483647.0), sample_box_last(&drive.samples)->point.omega);
         command_box_write(&drive.commands, (command_t){.run = n & 1});
         TEST_ASSERT_EQUAL(n & 1, command_box_read(&drive.commands)->run);
         schedule_box_write(&drive.mrai.schedules, (mrai_schedule_t){.flux_step_q28 = n});
