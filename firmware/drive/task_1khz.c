@@ -171,11 +171,10 @@ static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_
 {
     task_state_t *task = &drive->task;
     const bool runs = task->run_state == RUN_STATE_RUN && faults == 0U && !drive_has_ended_movement(drive);
-    command_t command = {
-        .run = drive_bridge_mode(drive, runs),
-        .faults = faults,
-        .fault_resets = task->fault_resets,
-    };
+    command_t command;
+    command.run = drive_bridge_mode(drive, runs);
+    command.faults = faults;
+    command.fault_resets = task->fault_resets;
     if (runs) {
         commanded->i = next_references(drive, snapshot);
         commanded->flux = flux_table_step(&drive->motor->flux_table, commanded->i);
@@ -184,6 +183,7 @@ static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_
         command.target = current_control_target(&drive->parameters.current_control, commanded,
                                                 current_control_by_target(snapshot->psi_d_error), &task->rotating);
     } else {
+        command.target = (current_target_t){0};
         reset_torque_path(drive);
         task->rotating = (rotating_flux_t){.psi = {commanded->flux.psi_d, commanded->flux.psi_q}};
     }
