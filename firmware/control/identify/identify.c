@@ -52,10 +52,10 @@ static int32_t measurement_noise(const identify_config_t *config, const identify
 /* Adds the step's share of each word of a measurement. */
 static void add_to_mean(void *mean, const void *now)
 {
-    int32_t *to = mean;
-    const int32_t *from = now;
-    for (unsigned n = 0; n < sizeof(identify_measurement_t) / sizeof *to; n++) {
-        to[n] = fx_mulhi_add(to[n], from[n], PER_STEP);
+    const int32_t *from = now, *const end = &from[sizeof(identify_measurement_t) / sizeof *from];
+    for (int32_t *to = mean; from != end; to++) {
+        *to = fx_mulhi_add(*to, *from, PER_STEP);
+        from++;
     }
 }
 
