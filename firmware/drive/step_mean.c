@@ -6,7 +6,7 @@ static bool has_sums(const snapshot_t *snapshot)
     return !snapshot->mrai_is_chosen && snapshot->window.acting;
 }
 
-static dq_q15_t mean_of(const drive_t *drive, dq_q15_t sum)
+dq_q15_t step_mean_of(const drive_t *drive, dq_q15_t sum)
 {
     const int32_t half_gain_q32 = drive->motor->identify.mean_gain_q32;
     return (dq_q15_t){fx_mulhi(2 * sum.d, half_gain_q32), fx_mulhi(2 * sum.q, half_gain_q32)};
@@ -14,10 +14,10 @@ static dq_q15_t mean_of(const drive_t *drive, dq_q15_t sum)
 
 dq_q15_t step_mean_current(const drive_t *drive, const snapshot_t *snapshot)
 {
-    return has_sums(snapshot) ? mean_of(drive, snapshot->window.sum_i) : snapshot->sample.point.i;
+    return has_sums(snapshot) ? step_mean_of(drive, snapshot->window.sum_i) : snapshot->sample.point.i;
 }
 
 dq_q15_t step_mean_voltage(const drive_t *drive, const snapshot_t *snapshot)
 {
-    return has_sums(snapshot) ? mean_of(drive, snapshot->window.sum_u) : snapshot->sample.point.u;
+    return has_sums(snapshot) ? step_mean_of(drive, snapshot->window.sum_u) : snapshot->sample.point.u;
 }

@@ -14,5 +14,7 @@
 dq_q15_t step_mean_current(const drive_t *drive, const snapshot_t *snapshot);
 /** Of the acting voltage. */
 dq_q15_t step_mean_voltage(const drive_t *drive, const snapshot_t *snapshot);
+/** The sums of a window as means. */
+dq_q15_t step_mean_of(const drive_t *drive, dq_q15_t sum);
 
 #endif

@@ -170,8 +170,7 @@ static void check_by_second_level(ecu_t *ecu, const raw_sample_t *raw)
     };
     const second_level_constants_t *constants = drive->motor->second_level;
     drive->data_check.damaged |= !second_level_own_data_step(constants, &ecu->second_level.own_data);
-    const bool excessive = second_level_step(constants, &ecu->second_level, &in);
-    drive->request.faults = excessive ? FAULT_TORQUE : 0U;
+    drive->request.faults = second_level_step(constants, &ecu->second_level, &in) ? FAULT_TORQUE : 0U;
 }
 
 static void service_watchdog(ecu_t *ecu)
@@ -235,6 +234,7 @@ void ecu_task_1khz(ecu_t *ecu)
     ecu_pass(ecu, FLOW_STATES);
     command_drive(ecu);
     ecu_pass(ecu, FLOW_ARBITRATED);
+    ecu_check_dc_sensor(ecu);
     task_1khz(&ecu->drive);
     scope_step(&ecu->scope, &ecu->drive, ecu->supervisor.faults != 0U);
     check_by_second_level(ecu, &raw);

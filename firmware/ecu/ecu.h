@@ -19,6 +19,7 @@
 #include "ecu/battery_voltage.h"
 #include "ecu/shut_off.h"
 #include "ecu/supervisor.h"
+#include "safety/dc_jump.h"
 #include "second_level/second_level.h"
 #include "signal/step_clock.h"
 
@@ -47,6 +48,7 @@ typedef struct {
     liveness_t liveness;
     settling_t settling;
     battery_voltage_t battery_voltage;
+    dc_jump_state_t dc_jump;
     shut_off_t shut_off;
     uint8_t question; /* of the external watchdog, at the start of the step */
     uint16_t not_sent;

@@ -17,6 +17,8 @@ void ecu_watch(ecu_t *ecu);
 supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault);
 arbitrate_in_t ecu_arbitration(const ecu_t *ecu);
 torque_limits_t ecu_limits(const ecu_t *ecu);
+/* Raises FAULT_INPUT if the gain of the dc voltage sensor has jumped; once per step, before the drive's task. */
+void ecu_check_dc_sensor(ecu_t *ecu);
 /* The movement that the bus requests. */
 movement_request_t ecu_movement(const ecu_t *ecu);
 /* The part of the telemetry that comes from the bus and the state machine. */

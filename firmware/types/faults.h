@@ -17,7 +17,7 @@
     X(UNDER_VOLTAGE, 2, "The dc voltage is below its lower limit in 10 samples while the drive runs.") \
     X(CURRENT_SUM, 3, "The sum of the phase currents exceeds 5 % of full scale in 5 samples.") \
     X(ANGLE, 4, "The angle is implausible for 7 ms or in more than one sample of 41, or its sensor reports an error.") \
-    X(INPUT, 5, "Samples are invalid or repeatedly missing, or the converter reference or a current's zero is wrong.") \
+    X(INPUT, 5, "Samples are invalid or repeatedly missing, or a converter's reference, zero or gain is wrong.") \
     X(OVERRUN, 6, "The 1 kHz task wrote no command for 2 steps, or the paper's law missed 3 periods in a row.") \
     X(CONFIG, 7, "The motor data or the port's settings failed a check; a separate value names the check.") \
     X(CONTROL, 8, "The current is off its reference for 20 ms, 100 ms at the voltage limit, or oscillates about it.") \
