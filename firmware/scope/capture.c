@@ -96,24 +96,34 @@ static void take(capture_t *capture, int16_t *memory, const capture_source_t *so
     }
 }
 
-static void record(capture_t *capture, int16_t *memory, const capture_source_t *source)
+static void count_armed(capture_t *capture, uint32_t count, bool found)
 {
-    uint32_t count = contiguous(capture, source->newest);
-    if (capture->state == CAPTURE_ARMED) {
-        bool found;
-        count = trigger_search(capture, source, count, &found);
-        take(capture, memory, source, count);
-        capture->filled = (uint16_t)lesser(capture->filled + count, capture->config.samples);
-        if (found) {
-            begin_after(capture);
-        }
-        return;
+    capture->filled = (uint16_t)lesser(capture->filled + count, capture->config.samples);
+    if (found) {
+        begin_after(capture);
     }
-    count = lesser(count, capture->remaining);
-    take(capture, memory, source, count);
+}
+
+static void count_triggered(capture_t *capture, uint32_t count)
+{
     capture->remaining = (uint16_t)(capture->remaining - count);
     if (capture->remaining == 0U) {
         capture->state = CAPTURE_DONE;
+    }
+}
+
+static void record(capture_t *capture, int16_t *memory, const capture_source_t *source)
+{
+    const bool armed = capture->state == CAPTURE_ARMED;
+    const uint32_t readable = contiguous(capture, source->newest);
+    bool found = false;
+    const uint32_t count = armed ? trigger_search(capture, source, readable, &found)
+                                 : lesser(readable, capture->remaining);
+    take(capture, memory, source, count);
+    if (armed) {
+        count_armed(capture, count, found);
+    } else {
+        count_triggered(capture, count);
     }
 }
 

@@ -67,11 +67,15 @@ typedef struct {
     /* Not read by tools. */
     uint32_t next;                      /* period of the next sample */
     uint32_t asked_for;                 /* period in which a command or a fault triggers */
+    int32_t trigger_offset;             /* the trigger is reached where sign * value + offset >= 0 */
     uint16_t at;                        /* row of the next sample */
     uint16_t filled;                    /* samples since the arming, at most `samples` */
     uint16_t remaining;                 /* samples until the end */
     uint8_t place[CAPTURE_SIGNALS_MAX]; /* of the signals in a slot, or in the values of the step */
     uint8_t of_step;                    /* bits of the signals that are values of the step */
+    uint8_t trigger_place;              /* of the trigger's signal: of the step from sizeof(sample_t) on */
+    int8_t trigger_sign;                /* 1, or -1: triggers downwards */
+    bool uses_step;                     /* one of the signals, or the trigger's, is a value of the step */
     bool asked;
     bool ready; /* reaching the level triggers: before an edge, the signal has been on the other side of it */
 } capture_t;

@@ -30,9 +30,10 @@ static inline uint32_t lesser(uint32_t a, uint32_t b)
     return (a < b) ? a : b;
 }
 
-/** The places of the captured signals, for columns_copy(): once, when a capture begins. */
+/** The places of the signals: once, when a capture begins. */
 void columns_find(capture_t *capture);
-column_t column_of(const capture_t *capture, const capture_source_t *source, uint8_t signal);
+/** The trigger's signal. */
+column_t column_of_trigger(const capture_t *capture, const capture_source_t *source);
 /** Copies `count` samples, at least one, of all captured signals, from the next period on. The samples must be
  * contiguous in the ring. */
 void columns_copy(const capture_t *capture, int16_t *to, const capture_source_t *source, uint32_t count);

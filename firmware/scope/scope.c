@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "scope/scope.h"
 
+#include "fx/codegen.h"
+
 static const capture_config_t freeze_frame = {
     .signals = 8,
     .signal = {CAPTURE_i_d_A, CAPTURE_i_q_A, CAPTURE_u_d_V, CAPTURE_u_q_V, CAPTURE_v_dc_V, CAPTURE_omega_rad_s,
@@ -134,25 +136,28 @@ static void end_fault(capture_t *capture)
     }
 }
 
-static void follow_faults(scope_t *scope, const drive_t *drive, bool ecu_fault, uint32_t newest)
+static void follow_fault(scope_t *scope, bool fault, uint32_t period, uint32_t newest)
 {
-    const bool drive_fault = drive->fast.faults != 0U;
-    const bool fault = drive_fault || ecu_fault;
-    if (fault && !scope->fault) {
-        begin_fault(&scope->capture, drive_fault ? drive->fast.fault_period : newest, newest);
-    } else if (!fault && scope->fault) {
+    if (fault) {
+        begin_fault(&scope->capture, period, newest);
+    } else {
         end_fault(&scope->capture);
     }
     scope->fault = fault;
 }
 
 /* The periods copied here ran with the task's last command but one, whose values are kept for them. The command that
- * the task has just written acts from the next period on. */
-void scope_record(scope_t *scope, const drive_t *drive, bool ecu_fault)
+ * the task has just written acts from the next period on.
+ * Not inlined: a step in which nothing is to be done then saves no registers. */
+FX_NOT_INLINED void scope_record(scope_t *scope, const drive_t *drive, bool fault)
 {
     const uint32_t newest = drive->samples.generation; /* read once: a freeze frame may use the whole ring */
-    follow_faults(scope, drive, ecu_fault, newest);
+    if (fault != scope->fault) {
+        follow_fault(scope, fault, (drive->fast.faults != 0U) ? drive->fast.fault_period : newest, newest);
+    }
     const capture_source_t source = {drive->samples.slot, newest, &scope->values};
     capture_step(&scope->capture, scope->memory, &source);
-    scope->values = step_values(drive);
+    if (scope->capture.uses_step) {
+        scope->values = step_values(drive);
+    }
 }

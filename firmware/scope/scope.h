@@ -42,15 +42,15 @@ typedef struct {
 
 /** command: without the protocol's own code. */
 scope_result_t scope_command(scope_t *scope, const drive_t *drive, const uint8_t *command, uint8_t length);
-/** A step of the scope while it records, or when a fault has occurred or has been reset. */
-void scope_record(scope_t *scope, const drive_t *drive, bool ecu_fault);
+/** A step of the scope while it records, or when a fault has occurred or has been reset. fault: of drive or ECU. */
+void scope_record(scope_t *scope, const drive_t *drive, bool fault);
 
 /** Once per step. ecu_fault: outside of the drive. */
 static inline void scope_step(scope_t *scope, const drive_t *drive, bool ecu_fault)
 {
     const bool fault = drive->fast.faults != 0U || ecu_fault;
     if (scope->capture.state == CAPTURE_ARMED || scope->capture.state == CAPTURE_TRIGGERED || fault != scope->fault) {
-        scope_record(scope, drive, fault && drive->fast.faults == 0U);
+        scope_record(scope, drive, fault);
     }
 }
 

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "scope/trigger.h"
 
-/* Reached where (value ^ flip) >= level: a trigger from above compares complements, which reverses the order. */
+#define SEARCHED_AT_ONCE 5U /* half of a step at 10 kHz */
+
+/* Reached where sign * value + offset >= 0. */
 typedef struct {
     column_t values;
-    int32_t level, flip;
+    int32_t sign, offset;
 } condition_t;
 
 static bool is_edge(const capture_t *capture)
@@ -14,30 +16,50 @@ static bool is_edge(const capture_t *capture)
 
 void trigger_reset(capture_t *capture)
 {
+    const capture_config_t *config = &capture->config;
+    const bool downwards = config->trigger == TRIGGER_FALLING || config->trigger == TRIGGER_BELOW;
+    capture->trigger_sign = downwards ? -1 : 1;
+    capture->trigger_offset = downwards ? config->level : -config->level;
     capture->ready = !is_edge(capture);
 }
 
 static condition_t condition(const capture_t *capture, const capture_source_t *source)
 {
-    const capture_config_t *config = &capture->config;
-    const int32_t flip = (config->trigger == TRIGGER_FALLING || config->trigger == TRIGGER_BELOW) ? -1 : 0;
-    return (condition_t){column_of(capture, source, config->trigger_signal), config->level ^ flip, flip};
+    return (condition_t){column_of_trigger(capture, source), capture->trigger_sign, capture->trigger_offset};
 }
 
-/* x < level is the same as ~x >= -level. */
+/* x < 0 is the same as -x - 1 >= 0. */
 static condition_t negated(condition_t condition)
 {
-    return (condition_t){condition.values, -condition.level, ~condition.flip};
+    return (condition_t){condition.values, -condition.sign, -condition.offset - 1};
 }
 
-/* The samples before the first that reaches the condition. */
+/* Negative: the value does not reach the condition. */
+static inline int32_t beyond(const condition_t *condition, const uint8_t *value)
+{
+    return condition->sign * value_at(value) + condition->offset;
+}
+
+/* The samples before the first that reaches the condition. The conjunction of several differences is negative if all
+ * are: they are searched with one branch. */
 static uint32_t count_until(const condition_t *condition, uint32_t from, uint32_t count)
 {
     const size_t stride = condition->values.stride;
     const uint8_t *value = &condition->values.from[from * stride];
-    const int32_t level = condition->level, flip = condition->flip;
     uint32_t k = from;
-    while (k < count && (value_at(value) ^ flip) < level) {
+    while (k + SEARCHED_AT_ONCE <= count) {
+        int32_t all = beyond(condition, value);
+        FX_UNROLLED
+        for (uint32_t j = 1; j < SEARCHED_AT_ONCE; j++) {
+            all &= beyond(condition, &value[j * stride]);
+        }
+        if (all >= 0) {
+            break;
+        }
+        value = &value[SEARCHED_AT_ONCE * stride];
+        k += SEARCHED_AT_ONCE;
+    }
+    while (k < count && beyond(condition, value) < 0) {
         value = &value[stride];
         k++;
     }

@@ -159,6 +159,18 @@ void test_a_level_waits_for_the_signal(void)
     TEST_ASSERT_EQUAL_UINT32((from + 26 + 49) / 50 * 50, triggered_in(TRIGGER_BELOW, -2500));
 }
 
+/* Samples are searched several at once: the first that reaches the level counts, wherever it lies among them. */
+void test_a_level_is_found_at_each_place_of_a_step(void)
+{
+    for (uint32_t place = 0; place < 2U * STEP; place++) {
+        setUp();
+        config.before = 0;
+        run(place);
+        const uint32_t first = newest + 1U;
+        TEST_ASSERT_EQUAL_UINT32((first + 40U) / 50U * 50U + 10U, triggered_in(TRIGGER_RISING, wave(10)));
+    }
+}
+
 void test_a_level_that_is_never_reached_does_not_trigger(void)
 {
     arm_for(TRIGGER_ABOVE, NEVER);
