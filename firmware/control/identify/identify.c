@@ -52,11 +52,15 @@ static int32_t measurement_noise(const identify_config_t *config, const identify
 /* Adds the step's share of each word of a measurement. */
 static void add_to_mean(void *mean, const void *now)
 {
-    const int32_t *from = now, *const end = &from[sizeof(identify_measurement_t) / sizeof *from];
-    for (int32_t *to = mean; from != end; to++) {
+    int32_t *to = mean;
+    const int32_t *from = now;
+    unsigned left = sizeof(identify_measurement_t) / sizeof *to;
+    do {
         *to = fx_mulhi_add(*to, *from, PER_STEP);
+        to++;
         from++;
-    }
+        left--;
+    } while (left > 0U);
 }
 
 static void average_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in,
@@ -157,17 +161,17 @@ static corrected_t correct(const identify_config_t *config, const identify_state
 {
     dq_q30_t shift = state->kept.local;
     int32_t value[IDENTIFY_STATES];
-    value[IDENTIFY_FLUX] = identify_value(config, state, IDENTIFY_FLUX) >> 1;
-    for (unsigned j = IDENTIFY_FIRST_OF_TABLES; j < IDENTIFY_STATES; j++) {
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         value[j] = identify_value(config, state, (identify_index_t)j) >> 1;
         shift.d = fx_add_q31(shift.d, identify_mul(value[j], m->psi_d.h_q30[j]));
         shift.q = fx_add_q31(shift.q, identify_mul(value[j], m->psi_q.h_q30[j]));
     }
     const int32_t iron = value[IDENTIFY_IRON];
+    const int32_t d_axis = identify_mul(value[IDENTIFY_LD], m->psi_d.h_q30[IDENTIFY_LD]);
     return (corrected_t){
         .at.psi = {fx_add_q31(m->psi.d, fx_add_q31(shift.d, value[IDENTIFY_FLUX])), fx_add_q31(m->psi.q, shift.q)},
         .at.i_m = {m->i_m.d + identify_mul(iron, m->iron_i.d), m->i_m.q + identify_mul(iron, m->iron_i.q)},
-        .magnet_q30 = fx_add_q31(value[IDENTIFY_FLUX], identify_mul(value[IDENTIFY_LD], m->psi_d.h_q30[IDENTIFY_LD])),
+        .magnet_q30 = fx_add_q31(value[IDENTIFY_FLUX], d_axis),
     };
 }
 
