@@ -54,13 +54,9 @@ static void add_to_mean(void *mean, const void *now)
 {
     int32_t *to = mean;
     const int32_t *from = now;
-    unsigned left = sizeof(identify_measurement_t) / sizeof *to;
-    do {
-        *to = fx_mulhi_add(*to, *from, PER_STEP);
-        to++;
-        from++;
-        left--;
-    } while (left > 0U);
+    for (unsigned n = 0; n < sizeof(identify_measurement_t) / sizeof *to; n++) {
+        to[n] = fx_mulhi_add(to[n], from[n], PER_STEP);
+    }
 }
 
 static void average_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in,
