@@ -9,7 +9,6 @@ may oscillate or not settle. A second of the bus takes about a second of a proce
 
 import contextlib
 import tempfile
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,14 +20,12 @@ from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.hidden import Truth
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.on_the_bus import Bench
-from fluxtrue_tools.commission.score import resistance_error, score, turned
-from fluxtrue_tools.commission.steps import chosen, run
+from fluxtrue_tools.commission.over_can import MOTOR, measure
+from fluxtrue_tools.commission.steps import chosen
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.build import Parts
-from fluxtrue_tools.sim.build import ROOT
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 
-MOTOR = ROOT / "tests" / "motors" / "unknown"
 START_S, OFF_S = 0.2, 0.1
 
 
@@ -63,21 +60,8 @@ def connected(made: Parts, name: str, seed: int) -> Iterator[tuple[OverTheBus, T
 @click.option("--step", "steps", default="all", show_default=True, help="As of `tools/fluxtrue commission`.")
 def main(machine: str, seed: int, steps: str) -> None:
     """Measure the machine and print the errors."""
-    begun = time.process_time()
     with connected(parts(), machine, seed) as (drive, truth, known):
-        found = run(drive, chosen(tuple(steps.split(","))), known, click.echo)
-        click.echo(f"{drive.line.now_s:.0f} s of the bus, {time.process_time() - begun:.0f} s of the evaluation")
-    if found.followed is not None:
-        click.echo(f"connection: {found.followed.connection}, true: {truth.plant['pole_pairs']:.0f} pole pairs, "
-                   f"reversed {truth.reversed}, {truth.offset_rad:.4f} rad")  # fmt: skip
-    if found.drag is not None:
-        click.echo(str(turned(found, truth)))
-    if found.resistance is not None:
-        whole, beyond = resistance_error(found.resistance.r_ohm, truth)
-        click.echo(f"resistance: {100.0 * whole:+.2f} %, beyond the sensors' gains {100.0 * beyond:+.2f} %")
-    if found.surface is not None:
-        psi_f_Vs = found.spun.psi_f_Vs if found.spun is not None else truth.psi_f_Vs
-        click.echo(str(score(found.surface.model, truth, known.i_max_A, psi_f_Vs)))
+        measure(drive, truth, known, chosen(tuple(steps.split(","))))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Commissioning over CAN: a virtual ECU with a hidden machine, and the errors of what was found.
+
+python -m fluxtrue_tools.commission.over_can --machine saturated --seed 12 --step map
+
+If a step turns the shaft, sensor and leads are connected at random.
+"""
+
+import time
+
+import click
+
+from fluxtrue_tools.commission import hidden, on_the_bus
+from fluxtrue_tools.commission.bus import OverTheBus
+from fluxtrue_tools.commission.cli import nameplate_of
+from fluxtrue_tools.commission.hidden import Truth
+from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.score import resistance_error, score, turned
+from fluxtrue_tools.commission.steps import Step, chosen, run
+from fluxtrue_tools.sim import motor as motors
+from fluxtrue_tools.sim.build import ROOT
+
+MOTOR = ROOT / "tests" / "motors" / "unknown"
+
+
+def measure(drive: OverTheBus, truth: Truth, known: Nameplate, steps: list[Step]) -> None:
+    """Run the steps and print their errors."""
+    begun = time.process_time()
+    found = run(drive, steps, known, click.echo)
+    click.echo(f"{drive.line.now_s:.0f} s of the bus, {time.process_time() - begun:.0f} s of the evaluation")
+    if found.followed is not None:
+        click.echo(f"connection: {found.followed.connection}, true: {truth.plant['pole_pairs']:.0f} pole pairs, "
+                   f"reversed {truth.reversed}, {truth.offset_rad:.4f} rad")  # fmt: skip
+    if found.drag is not None:
+        click.echo(str(turned(found, truth)))
+    if found.resistance is not None:
+        whole, beyond = resistance_error(found.resistance.r_ohm, truth)
+        click.echo(f"resistance: {100.0 * whole:+.2f} %, beyond the sensors' gains {100.0 * beyond:+.2f} %")
+    if found.surface is not None:
+        psi_f_Vs = found.spun.psi_f_Vs if found.spun is not None else truth.psi_f_Vs
+        click.echo(str(score(found.surface.model, truth, known.i_max_A, psi_f_Vs)))
+
+
+@click.command()
+@click.option("--machine", default="saturated", show_default=True, help="One of the project's, changed at random.")
+@click.option("--seed", default=12, show_default=True, help="Of these changes.")
+@click.option("--step", "steps", default="map", show_default=True, help="As of `tools/fluxtrue commission`.")
+def main(machine: str, seed: int, steps: str) -> None:
+    """Measure the machine and print the errors."""
+    wanted = chosen(tuple(steps.split(",")))
+    as_assumed = all(step.name != "phases" for step in wanted)
+    motor = motors.load(str(MOTOR))
+    known = nameplate_of(MOTOR, motor)
+    truth, _, _ = hidden.draw(machine, seed, motor, known.i_max_A, as_assumed)
+    with (on_the_bus.hidden_machine(motor, machine, seed, known.i_max_A, as_assumed) as bench,
+          on_the_bus.connected(bench, motor, known) as drive):  # fmt: skip
+        measure(drive, truth, known, wanted)
+
+
+if __name__ == "__main__":
+    main()
