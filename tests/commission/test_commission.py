@@ -121,6 +121,21 @@ def test_the_rotor_swings_little(name: str, seed: int, most_deg: float, unknown:
     assert 0.0 < swings_deg.max() <= most_deg
 
 
+def test_the_swing_grows_with_the_square_of_the_pole_pairs(unknown: Motor, known: Nameplate) -> None:
+    """(CM-28): hsm1 100 and 105 have six and seven pole pairs when their connection is unknown, and four when it is
+    not."""
+    rms_deg = {}
+    for pole_pairs in (4, 8):
+        _, flux_map, plant = hidden.draw("hsm1", 105, unknown, known.i_max_A, connected=False, other_errors=True)
+        drive = Watched(Loop(unknown.library, plant | {"pole_pairs": float(pole_pairs)}, flux_map))
+        found = run(drive, chosen(("all",)), known, lambda _: None)
+        assert found.spun is not None and found.spun.connection.pole_pairs == pole_pairs
+        swings_deg = np.degrees(pole_pairs * np.array(drive.swings_rad[-len(found.bursts) :]))
+        rms_deg[pole_pairs] = float(np.sqrt(np.mean(swings_deg**2)))
+        print(pole_pairs, f"{rms_deg[pole_pairs]:.2f} rms, largest {swings_deg.max():.2f} degrees")
+    assert rms_deg[8] / rms_deg[4] == pytest.approx(4.0, rel=0.2)
+
+
 def test_the_truth_cannot_be_read(unknown: Motor, known: Nameplate) -> None:
     drive, _ = hidden.make("hsm1", 1, unknown, known.i_max_A)
     for name in ("plant.r_ohm_20", "truth.torque_Nm"):
