@@ -66,7 +66,7 @@ static void follow(dc_jump_state_t *state, q15_t v_dc, q15_t kappa)
 {
     state->v_dc = v_dc;
     state->half_kappa = (q15_t)(state->half_kappa + (kappa - state->half_kappa) / 4);
-    state->before = (uint8_t)fx_min_s32(state->before + 1, SETTLED);
+    state->before = (uint8_t)fx_min_s32((int32_t)state->before + 1, SETTLED);
 }
 
 /* What the jump interrupts must have been steady, and what follows it must be of the sensor. */
@@ -75,7 +75,7 @@ static bool continues(const dc_jump_state_t *state, const dc_jump_in_t *in, q15_
     if (!is_jump(state, in->v_dc)) {
         return state->before > 0U && state->after == 0U;
     }
-    return state->before == SETTLED && (state->after < WAIT || is_of_sensor(state, in->v_dc, kappa));
+    return state->before == (uint8_t)SETTLED && (state->after < (uint8_t)WAIT || is_of_sensor(state, in->v_dc, kappa));
 }
 
 bool dc_jump_step(const dc_jump_config_t *config, dc_jump_state_t *state, const dc_jump_in_t *in)
@@ -86,9 +86,9 @@ bool dc_jump_step(const dc_jump_config_t *config, dc_jump_state_t *state, const 
     } else if (has_moved(config, state, in) || !continues(state, in, kappa)) {
         begin(state, in, kappa);
     } else if (is_jump(state, in->v_dc)) {
-        state->after = (uint8_t)fx_min_s32(state->after + 1, FOUND);
+        state->after = (uint8_t)fx_min_s32((int32_t)state->after + 1, FOUND);
     } else {
         follow(state, in->v_dc, kappa);
     }
-    return state->after == FOUND;
+    return state->after == (uint8_t)FOUND;
 }

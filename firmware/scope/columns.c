@@ -56,9 +56,11 @@ static inline FX_INLINED_IF_OPTIMISED void copy_row(int16_t *to, const uint8_t *
 }
 
 /* Two rows per pass; the places stay in registers. */
-static inline FX_INLINED_IF_OPTIMISED void copy_each(const capture_t *capture, int16_t *to, const uint8_t *from,
+static inline FX_INLINED_IF_OPTIMISED void copy_each(const capture_t *capture, int16_t *first, const uint8_t *oldest,
                                                      uint32_t count, const uint32_t signals)
 {
+    int16_t *to = first;
+    const uint8_t *from = oldest;
     const size_t stride = stride_of(capture);
     size_t place[CAPTURE_SIGNALS_MAX];
     FX_UNROLLED
@@ -99,6 +101,7 @@ static FX_NOT_INLINED void copy_rows(const capture_t *capture, int16_t *to, cons
         COPY(7U)
     default:
         copy_each(capture, to, from, count, CAPTURE_SIGNALS_MAX);
+        break;
     }
 }
 

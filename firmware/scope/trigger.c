@@ -48,12 +48,12 @@ static uint32_t count_until(const condition_t *condition, uint32_t from, uint32_
     const uint8_t *value = &condition->values.from[from * stride];
     uint32_t k = from;
     while (k + SEARCHED_AT_ONCE <= count) {
-        int32_t all = beyond(condition, value);
+        int32_t signs = beyond(condition, value);
         FX_UNROLLED
         for (uint32_t j = 1; j < SEARCHED_AT_ONCE; j++) {
-            all &= beyond(condition, &value[j * stride]);
+            signs &= beyond(condition, &value[j * stride]);
         }
-        if (all >= 0) {
+        if (signs >= 0) {
             break;
         }
         value = &value[SEARCHED_AT_ONCE * stride];
