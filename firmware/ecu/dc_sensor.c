@@ -3,28 +3,21 @@
 #include "drive/step_mean.h"
 #include "ecu/ecu_private.h"
 
-/* Of one period. Without the sums of a step the mean voltage is that of the period. */
-static dc_jump_in_t read_period(const drive_t *drive)
+/* Of the newest period and the last window, which ends in it or shortly before. Without the sums of a step the mean
+ * voltage is that of the period. */
+static dc_jump_in_t read_inputs(const drive_t *drive)
 {
-    const bool has_sums = !mrai_is_chosen(drive);
-    dc_jump_in_t in;
-    uint32_t generation;
-    do {
-        generation = drive->samples.generation;
-        exchange_barrier();
-        const sample_t *sample = sample_box_at(&drive->samples, generation);
-        const identify_window_t *window = window_box_at(&drive->windows);
-        in = (dc_jump_in_t){
-            .acting = sample->acting && !drive_bypasses_torque_path(drive),
-            .u = (has_sums && window->acting) ? step_mean_of(drive, window->sum_u) : sample->point.u,
-            .i = sample->point.i,
-            .psi = {sample->point.flux.psi_d, sample->point.flux.psi_q},
-            .omega = fx_q15_from_q31(sample->point.omega),
-            .v_dc = (q15_t)sample->v_dc,
-        };
-        exchange_barrier();
-    } while (drive->samples.generation != generation);
-    return in;
+    const sample_t *sample = sample_box_at(&drive->samples, drive->samples.generation);
+    const identify_window_t *window = window_box_at(&drive->windows);
+    const bool has_sums = !mrai_is_chosen(drive) && window->acting;
+    return (dc_jump_in_t){
+        .acting = sample->acting && !drive_bypasses_torque_path(drive),
+        .u = has_sums ? step_mean_of(drive, window->sum_u) : sample->point.u,
+        .i = sample->point.i,
+        .psi = {sample->point.flux.psi_d, sample->point.flux.psi_q},
+        .omega = fx_q15_from_q31(sample->point.omega),
+        .v_dc = (q15_t)sample->v_dc,
+    };
 }
 
 void ecu_check_dc_sensor(ecu_t *ecu)
@@ -33,7 +26,7 @@ void ecu_check_dc_sensor(ecu_t *ecu)
     const torque_monitor_config_t *monitor = &drive->motor->torque_monitor;
     const dc_jump_config_t config = {
         .r = monitor->r >> 15, .rate_gain = monitor->rate_gain, .v_0 = monitor->v_0, .t_0 = monitor->t_0};
-    dc_jump_in_t in = read_period(drive);
+    dc_jump_in_t in = read_inputs(drive);
     in.psi_last = drive->task.torque_monitor.psi;
     in.torque = drive->task.torque_commanded;
     if (dc_jump_step(&config, &ecu->dc_jump, &in)) {

@@ -79,7 +79,7 @@ static inline FX_INLINED_IF_OPTIMISED void copy_each(const capture_t *capture, i
         FX_ADDRESS_ONCE(from);
         copy_row(&to[signals], from, place, signals);
         from = &from[stride];
-        to = &to[2U * signals];
+        to = &to[2U * (size_t)signals];
     }
 }
 

@@ -234,6 +234,33 @@ void test_at_a_low_dc_voltage_the_machine_is_slow_below_what_could_charge_the_li
     TEST_ASSERT_TRUE(observe()->slow);
 }
 
+/* The sensor reads so many times the voltage, and the drive computes the acting voltage from it. */
+static void read_dc(double gain)
+{
+    sample.v_dc = (int32_t)(gain * 350.0 * COUNT_PER_V);
+    sample.point.u.q = (int32_t)(gain * 7000.0);
+    *sample_box_begin(&ecu.drive.samples) = sample;
+    sample_box_publish(&ecu.drive.samples);
+    ecu_check_dc_sensor(&ecu);
+}
+
+void test_a_dc_voltage_sensor_whose_gain_jumps_is_an_input_fault_in_the_eighth_step(void)
+{
+    sample.acting = true;
+    sample.point.omega = 1 << 30;
+    sample.point.flux.psi_d = 14000;
+    ecu.drive.task.torque_monitor.psi.d = 14000;
+    for (int n = 0; n < 6; n++) {
+        read_dc(1.0);
+    }
+    for (int n = 0; n < 7; n++) {
+        read_dc(1.2);
+    }
+    TEST_ASSERT_EQUAL_HEX32(0, ecu.drive.request.faults);
+    read_dc(1.2);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_INPUT, ecu.drive.request.faults);
+}
+
 void test_the_command_of_the_bus_is_passed_on(void)
 {
     const supervisor_in_t *out = observe();

@@ -121,6 +121,19 @@ void tearDown(void)
 {
 }
 
+void test_the_values_of_the_step_are_kept_if_the_trigger_needs_them(void)
+{
+    arm();
+    TEST_ASSERT_FALSE(capture.uses_step);
+    config.trigger_signal = CAPTURE_torque_commanded_Nm;
+    arm();
+    TEST_ASSERT_TRUE(capture.uses_step);
+    config.trigger_signal = CAPTURE_i_q_A;
+    config.signal[0] = CAPTURE_torque_commanded_Nm;
+    arm();
+    TEST_ASSERT_TRUE(capture.uses_step);
+}
+
 void test_a_rising_edge_triggers_where_the_signal_comes_from_below(void)
 {
     run(20); /* the first wave's edge at 0 lies within the samples that must be before the trigger */
