@@ -73,7 +73,7 @@ static void follow(dc_jump_state_t *state, q15_t v_dc, q15_t kappa)
 static bool continues(const dc_jump_state_t *state, const dc_jump_in_t *in, q15_t kappa)
 {
     if (!is_jump(state, in->v_dc)) {
-        return state->before > 0U && state->after == 0U;
+        return state->after == 0U;
     }
     return state->before == (uint8_t)SETTLED && (state->after < (uint8_t)WAIT || is_of_sensor(state, in->v_dc, kappa));
 }

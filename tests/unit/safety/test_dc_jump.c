@@ -256,15 +256,6 @@ void test_a_voltage_against_the_rotational_one_is_not_compared(void)
     TEST_ASSERT_EQUAL(NEVER, found_in(50));
 }
 
-void test_after_a_reading_of_zero_the_steady_time_begins_anew(void)
-{
-    state = (dc_jump_state_t){0};
-    in.v_dc = 0;
-    TEST_ASSERT_FALSE(step());
-    TEST_ASSERT_EQUAL_UINT8(1, state.before);
-    TEST_ASSERT_EQUAL_UINT8(0, state.after);
-}
-
 void test_no_argument_wraps(void)
 {
     static const int32_t ends[] = {-32768, 0, 32767};
