@@ -7,7 +7,7 @@
  * voltage is that of the period. */
 static dc_jump_in_t read_inputs(const drive_t *drive)
 {
-    const sample_t *sample = sample_box_at(&drive->samples, drive->samples.generation);
+    const sample_t *sample = sample_box_last(&drive->samples);
     const identify_window_t *window = window_box_at(&drive->windows);
     const bool has_sums = !mrai_is_chosen(drive) && window->acting;
     return (dc_jump_in_t){

@@ -29,6 +29,11 @@ MAP = ("map rms, % of psi_max", "R, %", "R beyond the sensors' gains, %", "gain 
 TURNING = ("wrong connections", "offset, deg", "psi_f, %", "inertia, %", "drag, %")
 
 
+def draw(machines: int) -> list[tuple[str, int]]:
+    """Name and seed of so many hidden machines, of all kinds in turn."""
+    return [(KINDS[k % len(KINDS)], FIRST_SEED + k) for k in range(machines)]
+
+
 def _one(name: str, seed: int, folder: Path) -> tuple[float, ...] | None:
     """Errors in the order of MAP, share of i_max, movement in degrees; None after a refusal."""
     motor = motors.load(str(folder))
@@ -79,7 +84,7 @@ def main(machines: int, turning: bool, drive: bool, other_errors: bool, out: Pat
     """Score hidden machines one after the other."""
     if (turning and drive) or (not drive and (other_errors or out is not None or fresh)):
         raise click.UsageError("--other-errors, --out and --fresh belong to --drive, which --turning excludes")
-    drawn = [(KINDS[k % len(KINDS)], FIRST_SEED + k) for k in range(machines)]
+    drawn = draw(machines)
     if drive:
         sys.exit(0 if _driven(drawn, other_errors, out, fresh) else 1)
     _scored(drawn, turning)

@@ -16,11 +16,12 @@ import click
 
 from fluxtrue_tools.commission import hidden, on_the_bus
 from fluxtrue_tools.commission.bus import OverTheBus
+from fluxtrue_tools.commission.campaign import FOLDER
 from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.hidden import Truth
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.on_the_bus import Bench
-from fluxtrue_tools.commission.over_can import MOTOR, measure
+from fluxtrue_tools.commission.over_can import measure
 from fluxtrue_tools.commission.steps import chosen
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.build import Parts
@@ -31,14 +32,14 @@ START_S, OFF_S = 0.2, 0.1
 
 def parts() -> Parts:
     """The image and its emulation, built if needed."""
-    return build.prepare(str(MOTOR), angle="as5047", flashed=True)
+    return build.prepare(str(FOLDER), angle="as5047", flashed=True)
 
 
 @contextlib.contextmanager
 def connected(made: Parts, name: str, seed: int) -> Iterator[tuple[OverTheBus, Truth, Nameplate]]:
     """The image with this machine, whose sensor and leads are connected at random; its bus; the nameplate."""
     motor = made.motor
-    known = nameplate_of(MOTOR, motor)
+    known = nameplate_of(FOLDER, motor)
     truth, flux_map, plant = hidden.draw(name, seed, motor, known.i_max_A, connected=False)
     with contextlib.ExitStack() as stack:
         machine = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "machine.txt"

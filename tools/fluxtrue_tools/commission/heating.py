@@ -14,7 +14,7 @@ import click
 import numpy as np
 
 from fluxtrue_tools.commission import hidden
-from fluxtrue_tools.commission.campaign import FIRST_SEED, FOLDER, KINDS
+from fluxtrue_tools.commission.campaign import FOLDER, KINDS, draw
 from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.drive import Capture, SoftwareInTheLoop
 from fluxtrue_tools.commission.nameplate import Nameplate
@@ -71,8 +71,7 @@ def main(machines: int) -> None:
     motor = motors.load(str(FOLDER))
     known = nameplate_of(FOLDER, motor)
     found = []
-    for k in range(machines):
-        name, seed = KINDS[k % len(KINDS)], FIRST_SEED + k
+    for name, seed in draw(machines):
         found.append(measure(name, seed, motor, known))
         click.echo(f"{name:10} {seed}  " + "  ".join(f"{step} {s:.1f} s {share:.2f}"
                                                      for step, (s, share) in found[-1].items()))  # fmt: skip

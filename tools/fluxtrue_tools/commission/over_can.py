@@ -12,15 +12,13 @@ import click
 
 from fluxtrue_tools.commission import hidden, on_the_bus
 from fluxtrue_tools.commission.bus import OverTheBus
+from fluxtrue_tools.commission.campaign import FOLDER
 from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.hidden import Truth
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import resistance_error, score, turned
 from fluxtrue_tools.commission.steps import Step, chosen, run
 from fluxtrue_tools.sim import motor as motors
-from fluxtrue_tools.sim.build import ROOT
-
-MOTOR = ROOT / "tests" / "motors" / "unknown"
 
 
 def measure(drive: OverTheBus, truth: Truth, known: Nameplate, steps: list[Step]) -> None:
@@ -49,8 +47,8 @@ def main(machine: str, seed: int, steps: str) -> None:
     """Measure the machine and print the errors."""
     wanted = chosen(tuple(steps.split(",")))
     as_assumed = all(step.name != "phases" for step in wanted)
-    motor = motors.load(str(MOTOR))
-    known = nameplate_of(MOTOR, motor)
+    motor = motors.load(str(FOLDER))
+    known = nameplate_of(FOLDER, motor)
     truth, _, _ = hidden.draw(machine, seed, motor, known.i_max_A, as_assumed)
     with (on_the_bus.hidden_machine(motor, machine, seed, known.i_max_A, as_assumed) as bench,
           on_the_bus.connected(bench, motor, known) as drive):  # fmt: skip

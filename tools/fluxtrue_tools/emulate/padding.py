@@ -13,10 +13,10 @@ from elftools.dwarf.die import DIE
 from elftools.elf.elffile import ELFFile
 
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim.members import bare, elements
 
 _ADDRESS: Final = 0x03  # DW_OP_addr
 _DECLARED: Final = ("DW_AT_specification", "DW_AT_abstract_origin")  # the latter: after optimization across files
-_NAMES: Final = ("DW_TAG_typedef", "DW_TAG_const_type", "DW_TAG_volatile_type")
 _RECORDS: Final = ("DW_TAG_structure_type", "DW_TAG_union_type")
 
 
@@ -24,18 +24,7 @@ def _type(die: DIE) -> DIE:
     """The type of a variable, member or array's element, without typedef, const and volatile."""
     while "DW_AT_type" not in die.attributes:
         die = die.get_DIE_from_attribute(next(name for name in _DECLARED if name in die.attributes))
-    die = die.get_DIE_from_attribute("DW_AT_type")
-    while die.tag in _NAMES:
-        die = die.get_DIE_from_attribute("DW_AT_type")
-    return die
-
-
-def _length(array: DIE) -> int:
-    count = 1
-    for child in array.iter_children():
-        if child.tag == "DW_TAG_subrange_type":
-            count *= int(child.attributes["DW_AT_upper_bound"].value) + 1
-    return count
+    return bare(die.get_DIE_from_attribute("DW_AT_type"))
 
 
 def _placed(member: DIE) -> tuple[int, bytes]:
@@ -52,7 +41,7 @@ def _placed(member: DIE) -> tuple[int, bytes]:
 def _used(die: DIE) -> bytes:
     """1 for each byte of a type that belongs to a value, 0 for padding."""
     if die.tag == "DW_TAG_array_type":
-        return _used(_type(die)) * _length(die)
+        return _used(_type(die)) * elements(die)
     used = bytearray(int(die.attributes["DW_AT_byte_size"].value))
     if die.tag not in _RECORDS:
         return b"\1" * len(used)

@@ -5,6 +5,7 @@ Tests use them to plant a fault in memory, and to read what no name of fluxtrue_
 """
 
 import ctypes
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ def _name(die: DIE) -> str:
     return found.value.decode() if found else ""
 
 
-def _bare(die: DIE) -> DIE:
+def bare(die: DIE) -> DIE:
     """The type without typedef, const and volatile."""
     while die.tag in ("DW_TAG_typedef", "DW_TAG_const_type", "DW_TAG_volatile_type"):
         die = die.get_DIE_from_attribute("DW_AT_type")
@@ -43,14 +44,15 @@ def _length(subrange: DIE) -> int:
     return int(given["DW_AT_count"].value) if "DW_AT_count" in given else int(given["DW_AT_upper_bound"].value) + 1
 
 
+def elements(array: DIE) -> int:
+    """Number of elements of an array of any dimensions."""
+    return math.prod(_length(child) for child in array.iter_children() if child.tag == "DW_TAG_subrange_type")
+
+
 def _size(die: DIE) -> int:
-    die = _bare(die)
+    die = bare(die)
     if die.tag == "DW_TAG_array_type":
-        count = 1
-        for child in die.iter_children():
-            if child.tag == "DW_TAG_subrange_type":
-                count *= _length(child)
-        return count * _size(die.get_DIE_from_attribute("DW_AT_type"))
+        return elements(die) * _size(die.get_DIE_from_attribute("DW_AT_type"))
     return int(die.attributes["DW_AT_byte_size"].value)
 
 
@@ -64,7 +66,7 @@ def _member(die: DIE, name: str) -> tuple[DIE, int] | None:
         kind = child.get_DIE_from_attribute("DW_AT_type")
         if _name(child) == name:
             return kind, offset
-        if not _name(child) and (inner := _member(_bare(kind), name)):
+        if not _name(child) and (inner := _member(bare(kind), name)):
             return inner[0], offset + inner[1]
     return None
 
@@ -81,14 +83,14 @@ class Members:
         die, offset = self.root, 0
         for part in member.split("."):
             match = _PART.fullmatch(part)
-            found = _member(_bare(die), match[1]) if match else None
+            found = _member(bare(die), match[1]) if match else None
             if match is None or found is None:
                 raise FluxtrueError(f"{member}: the firmware's state has no member '{part}' there")
             die, offset = found[0], offset + found[1]
             for index in re.findall(r"\d+", match[2]):
-                element = _bare(_bare(die).get_DIE_from_attribute("DW_AT_type"))
+                element = bare(bare(die).get_DIE_from_attribute("DW_AT_type"))
                 die, offset = element, offset + int(index) * _size(element)
-        return offset, _number(member, _bare(die))
+        return offset, _number(member, bare(die))
 
     def read(self, address: int, member: str) -> float:
         """The number at an instance."""
@@ -102,7 +104,7 @@ class Members:
 
 
 def _pointers(die: DIE, path: str) -> Iterator[str]:
-    die = _bare(die)
+    die = bare(die)
     if die.tag == "DW_TAG_pointer_type":
         yield path
     elif die.tag == "DW_TAG_array_type":
