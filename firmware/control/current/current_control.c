@@ -110,19 +110,20 @@ static int32_t remaining_voltage(int32_t other)
     return fx_circle_table[(other ^ (other >> 31)) >> 7];
 }
 
-/* While the d flux is to fall, the d axis has priority, and its excess is subtracted from q (CC-14). While the d flux
- * is to rise, the q axis has priority, because the q flux may be what limits the d axis; d keeps 0.7 of the circle, or
- * else the d flux would fall further and i_d would grow (CC-11). */
+/* While the d flux is to fall, the d axis has priority. While it is to rise, d gets what q leaves of the circle: the q
+ * flux may be what limits the d axis. It keeps 0.7, or else the d flux would fall further and i_d would grow (CC-11).
+ * What the d axis lacks is subtracted from q: only a smaller q flux gives the d axis its voltage (CC-14). */
 static dq_q15_t limit_to_circle(dq_q15_t v, int32_t error_d, int32_t turn)
 {
-    const dq_q15_t clipped = {fx_sat_q15_word(v.d), fx_sat_q15_word(v.q)};
+    int32_t d_max = Q15_MAX;
     if (error_d > 0) {
-        return (dq_q15_t){clamp_symmetric(clipped.d, fx_max_s32(remaining_voltage(clipped.q), V_D_MIN)), clipped.q};
+        d_max = fx_max_s32(remaining_voltage(fx_sat_q15_word(v.q)), V_D_MIN);
     }
-    const int32_t excess = fx_sat_q15_word(v.d - clipped.d);
+    const int32_t d = clamp_symmetric(v.d, d_max);
+    const int32_t excess = fx_sat_q15_word(v.d - d);
     const int32_t sign = turn >> 31; /* 0 or -1: with two's complement an excess of 0 changes nothing */
-    const int32_t reduced_q = v.q + (excess ^ sign) - sign;
-    return (dq_q15_t){clipped.d, clamp_symmetric(reduced_q, remaining_voltage(clipped.d))};
+    const int32_t q = v.q + (excess ^ sign) - sign;
+    return (dq_q15_t){d, clamp_symmetric(q, remaining_voltage(d))};
 }
 
 /* s += a T_s (u_limited - u), the difference limited to four times the circle (CC-10). Q33 * Q13 = Q30. */

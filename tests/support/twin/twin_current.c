@@ -19,20 +19,17 @@ static double remaining_voltage(double x)
     return fmax(sqrt(1.0 - end * end), 0.25);
 }
 
-/* The voltage circle. While the d flux must fall, the d axis has priority, and its excess is subtracted from q. While
- * the d flux must rise, the q axis has priority, but d may always use 0.7 of the radius. */
+/* The voltage circle. While the d flux must fall, the d axis has priority; while it must rise, d gets what the q axis
+ * leaves, at least 0.7 of the radius. What d lacks is subtracted from q, which gets the rest. */
 static twin_dq_t circle(twin_dq_t u, double u_max, bool more_flux, double omega)
 {
     const twin_dq_t v = {u.d / u_max, u.q / u_max};
-    const twin_dq_t limited = {twin_clamp(v.d, -1.0, 1.0), twin_clamp(v.q, -1.0, 1.0)};
-    if (more_flux) {
-        const double left = fmax(remaining_voltage(limited.q), 0.7);
-        return (twin_dq_t){u_max * twin_clamp(limited.d, -left, left), u_max * limited.q};
-    }
-    const double left = remaining_voltage(limited.d);
-    const double missing = twin_clamp(v.d - limited.d, -1.0, 1.0);
+    const double d_max = more_flux ? fmax(remaining_voltage(twin_clamp(v.q, -1.0, 1.0)), 0.7) : 1.0;
+    const double d = twin_clamp(v.d, -d_max, d_max);
+    const double missing = twin_clamp(v.d - d, -1.0, 1.0);
+    const double left = remaining_voltage(d);
     const double q = v.q + ((omega < 0.0) ? -missing : missing);
-    return (twin_dq_t){u_max * limited.d, u_max * twin_clamp(q, -left, left)};
+    return (twin_dq_t){u_max * d, u_max * twin_clamp(q, -left, left)};
 }
 
 /* Of the rotational voltage, by the measured flux. */

@@ -287,7 +287,8 @@ void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
         twin_current_state_t twin = {{2.0 * from_q31(state.s_d_q30) * f.v, 2.0 * from_q31(state.s_q_q30) * f.v}, false};
         const dq_q15_t u = step();
         const twin_dq_t t = twin_step(&twin);
-        if ((limited || twin.limited) && between_steps(((target.psi.d > psi.d) ? t.q : t.d) / v_max())) {
+        const bool q_chooses_step = target.psi.d > psi.d && between_steps(out.u.q / v_max());
+        if ((limited || twin.limited) && (q_chooses_step || between_steps(t.d / v_max()))) {
             continue;
         }
         limited_steps += twin.limited ? 1 : 0;
@@ -430,19 +431,37 @@ void test_the_excess_of_the_d_voltage_is_subtracted_from_the_q_voltage_in_the_di
 }
 
 /* psi_d* is one LSB above psi_d, so that the d flux is to rise. By hand: v_q = 3/5, whose table step ends at 154/256
- * and leaves 0.7988 for v_d. With |v_q| = 1 the d axis keeps 0.7. */
+ * and leaves 0.7988 for v_d. With |v_q| = 1 the d axis keeps 0.7, whose table step ends at 180/256 and leaves 0.7111
+ * for v_q. The excess of v_d, 0.05, moves v_q away from -1, but not inside these 0.7111. */
 void test_while_the_d_flux_is_to_rise_the_q_axis_has_priority(void)
 {
-    state.s_d_q30 = -(int32_t)(v_max() * 6 / 5) * 32768;
+    target.turn = 1;
+    state.s_d_q30 = -(int32_t)(v_max() * 4 / 5) * 32768;
     state.s_q_q30 = (int32_t)(v_max() * 3 / 5) * 32768;
     target.psi.d = (q15_t)(target.psi.d + 1);
-    const dq_q15_t u = step();
+    dq_q15_t u = step();
     TEST_ASSERT_INT_WITHIN(2, -0.7988 * v_max(), u.d);
-    TEST_ASSERT_INT_WITHIN(1, v_max() * 3 / 5, u.q);
+    TEST_ASSERT_INT_WITHIN(3, (0.6 - 0.0012) * v_max(), u.q);
     TEST_ASSERT_TRUE(limited);
+    state.s_d_q30 = (int32_t)(v_max() * 3 / 4) * 32768;
     state.s_q_q30 = -(1 << 30);
-    TEST_ASSERT_INT_WITHIN(1, -0.7 * v_max(), step().d);
-    TEST_ASSERT_INT_WITHIN(1, -v_max(), of_v(1));
+    u = step();
+    TEST_ASSERT_INT_WITHIN(1, 0.7 * v_max(), u.d);
+    TEST_ASSERT_INT_WITHIN(2, -0.7111 * v_max(), u.q);
+}
+
+/* By hand: the d flux is to rise, and v_d exceeds by 200 LSB the circle, all of which v_q = 0 leaves it: q gets these
+ * 200 LSB in the direction of rotation. */
+void test_also_while_the_d_flux_is_to_rise_the_excess_of_the_d_voltage_changes_the_q_voltage(void)
+{
+    target.psi.d = (q15_t)(target.psi.d + 1);
+    for (int sign = -1; sign <= 1; sign += 2) {
+        target.turn = sign;
+        state = (current_control_state_t){.s_d_q30 = (int32_t)(v_max() + 200.0) * 32768};
+        const dq_q15_t u = step();
+        TEST_ASSERT_INT_WITHIN(1, v_max(), u.d);
+        TEST_ASSERT_INT_WITHIN(2, sign * 200, u.q);
+    }
 }
 
 /* |v| between the circle of `clear` and the unit circle, in all directions. */

@@ -274,6 +274,32 @@ void test_at_the_voltage_limit_the_model_goes_as_far_as_the_voltage_reaches(void
     TEST_ASSERT_TRUE(largest < 1.05 * 14000.0 / 32768.0);
 }
 
+/* A machine generates in field weakening with all of its flux on the q axis, and the dc voltage falls at once: the
+ * voltage of one period is 14 % too small, then 4 % less are left than its flux needs, on the d axis alone. The
+ * reference stays. Only a smaller q flux gives the d axis its voltage. Without (CC-14) the q axis keeps its flux, and
+ * the d flux falls by a period's share of these 4 % in each period, that is |i_d| grows until the drive trips. */
+void test_the_d_flux_does_not_run_away_when_the_dc_voltage_falls(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        const double theta = 0.31 * sign, psi_q = -0.3 * sign;
+        const double needed = 2.0 * sin(0.5 * 0.31) / turn * 0.3;
+        machine_t machine = {.psi = I * psi_q, .slope = 1.0, .acts = 2.0 * I * sin(0.5 * theta) / turn * I * psi_q};
+        flux = (flux_point_t){.psi_q = (int32_t)lround(32768.0 * psi_q)};
+        turning_control_reset(&state, &flux);
+        target.psi = (dq_q15_halfword_t){0, (q15_t)flux.psi_q};
+        in.control.v_dc = (int32_t)lround(1.1 * needed / v_ratio * 32768.0);
+        run(&machine, theta, 20);
+        machine.acts *= 0.86;
+        in.control.v_dc = (int32_t)lround(0.96 * needed / v_ratio * 32768.0);
+        double least = 0.0;
+        for (int n = 0; n < 40; n++) {
+            run(&machine, theta, 1);
+            least = fmin(least, creal(machine.psi));
+        }
+        TEST_ASSERT_TRUE(least > -0.02); /* 0.14 * 0.31 * 0.3 = 0.013 are of the first period */
+    }
+}
+
 /* Nothing wraps: the sanitizers run this test too, and the results keep their limits. */
 void test_extreme_inputs_stay_within_their_limits(void)
 {
