@@ -171,7 +171,7 @@ typedef struct {
     q15_t torque_commanded;      /* the limited torque after slew */
     q15_t torque_corrected;      /* after the torque loop: input of the current reference */
     run_state_t run_state;
-    uint8_t excessive; /* steps in a row with too much torque after a fast change of speed; saturates */
+    uint8_t excessive; /* steps in a row with too much torque in field weakening; saturates */
     pulsing_t pulsing;
     movement_state_t movement;
     safe_state_state_t safe_state;

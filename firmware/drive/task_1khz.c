@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/data_check.h"
 #include "drive/drive.h"
+#include "drive/excess_torque.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/safe_decision.h"
 #include "drive/slow_monitors.h"
@@ -104,7 +105,7 @@ static q15_t torque_path(drive_t *drive, const snapshot_t *snapshot)
     task->torque_commanded = rate_limit_step(inside, limited, (q15_t)fx_max_s32(slew_limit(drive) - moved, 0));
     const torque_loop_in_t loop = {
         .torque_commanded = task->torque_commanded,
-        .torque_estimated = tracked_speed_estimate(drive, snapshot),
+        .torque_estimated = excess_torque_estimate(drive),
         .confidence = task->identification.confidence,
         .enabled = drive->request.torque_loop && !drive_bypasses_torque_path(drive),
         .limited = task->reference.limited || snapshot->sample.voltage_limited,

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef DRIVE_TRACKED_SPEED_H
 #define DRIVE_TRACKED_SPEED_H
-/** Corrects speed and torque estimate while the tracked speed lags far behind the rotor's: at tens of thousands of
- * rpm/s.
- * Source   docs/theory/current-reference.md (CR-15), docs/theory/torque-loop.md (TL-13)
+/** Corrects the speed while the tracked one lags far behind the rotor's: at tens of thousands of rpm/s.
+ * Source   docs/theory/current-reference.md (CR-15)
  * Units    per unit
  * Range    every snapshot; a lag that no rotor can cause counts as 0
  * Errors   none
@@ -15,10 +14,5 @@ int32_t tracked_speed_far_behind(const snapshot_t *snapshot);
 /** Speed for planning the voltage. The references must leave the voltage that the rotor's speed needs, or the currents
  * deviate from them near the voltage limit. A tracked speed that is too high only leaves voltage unused. */
 q15_t tracked_speed_planned(const snapshot_t *snapshot);
-
-/** Torque estimate for the torque loop. After a fast change of speed the correction of the previous operating point may
- * be too large until the loop has followed. Therefore torque in excess of the model counts fourfold, if it lasts longer
- * than after a torque step (TL-13). */
-q15_t tracked_speed_estimate(drive_t *drive, const snapshot_t *snapshot);
 
 #endif

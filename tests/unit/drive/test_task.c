@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/data_check.h"
+#include "drive/excess_torque.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/mrai/schedule_box.h"
 #include "drive/safe_decision.h"
@@ -292,28 +293,45 @@ void test_the_voltage_is_planned_for_the_speed_of_the_rotor_where_the_tracked_on
     }
 }
 
-/* 10 % too much: counted once, and from the fifth step of a fast change of speed on 7 % of it three times more. */
-void test_too_much_torque_counts_more_from_a_fast_change_of_speed_until_it_ends(void)
+static void have_torque(int commanded, int model, int estimated)
+{
+    drive.task.torque_commanded = (q15_t)commanded;
+    drive.task.torque_loop.model = model * 65536;
+    drive.task.identification.torque_estimated = (q15_t)estimated;
+}
+
+/* 10 % too much: counted once, in field weakening from the fifth step on 10 % - 1 % three times more. */
+void test_too_much_torque_counts_fourfold_in_field_weakening_until_it_ends(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
-        snapshot_t snapshot = {.sample = {.point = {.omega = 1 << 30}}};
-        drive.task.torque_commanded = (q15_t)(sign * 10000);
-        drive.task.torque_loop.model = sign * 10000 * 65536;
-        drive.task.identification.torque_estimated = (q15_t)(sign * 11000);
-        for (int n = 0; n < 20; n++) { /* at a steady speed */
-            TEST_ASSERT_EQUAL_INT(sign * 11000, tracked_speed_estimate(&drive, &snapshot));
+        drive.task.excessive = 0;
+        drive.task.voltage_reserve.trim = 32767; /* rounds to zero */
+        have_torque(sign * 10000, sign * 10000, sign * 11000);
+        for (int n = 0; n < 20; n++) {
+            TEST_ASSERT_EQUAL_INT(sign * 11000, excess_torque_estimate(&drive));
         }
-        snapshot.lag = (q15_t)(sign * 1500);
-        for (int n = 1; n <= 20; n++) {
-            const int expected = (n < 5) ? 11000 : 13100;
-            TEST_ASSERT_INT_WITHIN(3, sign * expected, tracked_speed_estimate(&drive, &snapshot));
-            snapshot.lag = 0; /* once begun it lasts */
+        drive.task.voltage_reserve.trim = sign * 65536;
+        for (int n = 1; n <= 20; n++) { /* in the fifth step 3 % are still tolerated */
+            const int expected = (n < 5) ? 11000 : ((n == 5) ? 13100 : 13700);
+            TEST_ASSERT_INT_WITHIN(3, sign * expected, excess_torque_estimate(&drive));
         }
-        drive.task.identification.torque_estimated = (q15_t)(sign * 10200);
-        TEST_ASSERT_EQUAL_INT(sign * 10200, tracked_speed_estimate(&drive, &snapshot));
-        drive.task.identification.torque_estimated = (q15_t)(sign * 11000);
-        TEST_ASSERT_EQUAL_INT(sign * 11000, tracked_speed_estimate(&drive, &snapshot));
+        have_torque(sign * 10000, sign * 10000, sign * 10200); /* 2 %: too little to begin, too much to end */
+        TEST_ASSERT_INT_WITHIN(3, sign * 10500, excess_torque_estimate(&drive));
+        have_torque(sign * 10000, sign * 10000, sign * 10090);
+        TEST_ASSERT_EQUAL_INT(sign * 10090, excess_torque_estimate(&drive));
         TEST_ASSERT_EQUAL_UINT8(0, drive.task.excessive);
+        have_torque(sign * 10000, sign * 10000, sign * 11000);
+        TEST_ASSERT_EQUAL_INT(sign * 11000, excess_torque_estimate(&drive));
+    }
+}
+
+/* A torque that falls is not too much: the model is ahead of the estimate by as much as the command is ahead of it. */
+void test_a_torque_that_follows_a_falling_command_is_not_too_much(void)
+{
+    drive.task.voltage_reserve.trim = 65536;
+    for (int n = 0; n < 20; n++) {
+        have_torque(9000, 10000, 11200);
+        TEST_ASSERT_EQUAL_INT(11200, excess_torque_estimate(&drive));
     }
 }
 
@@ -344,22 +362,31 @@ void test_the_planned_speed_is_never_smaller_than_the_tracked_one(void)
     TEST_ASSERT_EQUAL_INT(0, tracked_speed_planned(&backward));
 }
 
-/* 3 % of 10,000 are 300 counts; without a commanded torque the positive direction counts. */
-void test_torque_is_too_much_from_a_count_beyond_three_percent_on(void)
+/* 3 % of 10,000 are 300 counts, 1 % are 100; without a commanded torque the positive direction counts, and the least
+ * torque is that of the loop. */
+void test_torque_is_too_much_from_a_count_beyond_its_tolerance_on(void)
 {
     static const struct {
         int commanded, estimated;
-        uint8_t steps;
-    } cases[] = {{10000, 10300, 0}, {10000, 10301, 1}, {-10000, -10300, 0}, {-10000, -10301, 1}, {0, 5000, 1}};
-    const snapshot_t snapshot = {.lag = 1500};
+        uint8_t before, after;
+    } cases[] = {{10000, 10300, 0, 0}, {10000, 10301, 0, 1}, {-10000, -10300, 0, 0}, {-10000, -10301, 4, 5},
+                 {10000, 10300, 4, 0}, {10000, 10101, 5, 5}, {-10000, -10101, 5, 5}, {-10000, -10100, 5, 0},
+                 {10000, 10100, 5, 0}, {0, 5000, 0, 1},      {0, -5000, 0, 0}};
+    drive.task.voltage_reserve.trim = 65536;
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
-        drive.task.excessive = 0;
-        drive.task.torque_commanded = (q15_t)cases[n].commanded;
-        drive.task.torque_loop.model = cases[n].commanded * 65536;
-        drive.task.identification.torque_estimated = (q15_t)cases[n].estimated;
-        (void)tracked_speed_estimate(&drive, &snapshot);
-        TEST_ASSERT_EQUAL_UINT8(cases[n].steps, drive.task.excessive);
+        drive.task.excessive = cases[n].before;
+        have_torque(cases[n].commanded, cases[n].commanded, cases[n].estimated);
+        (void)excess_torque_estimate(&drive);
+        TEST_ASSERT_EQUAL_UINT8(cases[n].after, drive.task.excessive);
     }
+    const int least = (int)(0.03 * drive.parameters.torque_loop.torque_min + 0.5);
+    drive.task.excessive = 0;
+    have_torque(1, 1, 1 + least);
+    (void)excess_torque_estimate(&drive);
+    TEST_ASSERT_EQUAL_UINT8(0, drive.task.excessive);
+    have_torque(1, 1, 2 + least);
+    (void)excess_torque_estimate(&drive);
+    TEST_ASSERT_EQUAL_UINT8(1, drive.task.excessive);
 }
 
 /* Steps in a row of which the monitor of a frozen angle says that the angle stands still. The angles at all of them are
