@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """The steps that turn the shaft: hidden machines with an unknown connection, refusals, the limits of a movement."""
 
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fluxtrue_tools.cli import run as command
-from fluxtrue_tools.commission import connection, hidden, turning
+from fluxtrue_tools.commission import connection, hidden, spin, turning
 from fluxtrue_tools.commission.drive import CONNECTION, SoftwareInTheLoop
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import turned
 from fluxtrue_tools.commission.steps import chosen, run
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.flux_model import Array
 from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
 
@@ -20,6 +23,7 @@ MACHINES = [("saturated", 101, False), ("pmasynrm", 107, False), ("hsm1", 135, F
 OFFSET_DEG, PSI_F, INERTIA, DRAG = 0.2, 0.005, 0.03, 0.1
 SILENT, FAST = 1.0, 2.0
 RUN = 1.0
+STEP_S = 1e-3
 
 
 @pytest.mark.parametrize(("name", "seed", "other_errors"), MACHINES)
@@ -107,11 +111,37 @@ def test_the_source_of_the_angle_changes_only_while_switching_is_disabled(unknow
     assert drive.get("fault_word") == 0.0
 
 
-def test_the_smallest_current_that_the_rotor_follows_is_used(unknown: Motor, known: Nameplate) -> None:
-    drive, truth = hidden.make("hsm1", 110, unknown, known.i_max_A, connected=False)
-    found = connection.measure(drive, known, connection.rotate)
+# The rotor of linear 113 swings at 0.7 Hz about this current; that of leaf 124 at 1.3 Hz, near the frequency with which
+# the offsets of its sensors turn.
+@pytest.mark.parametrize(("name", "seed"), [("hsm1", 110), ("linear", 113), ("leaf", 124)])
+def test_the_rotor_follows_the_smallest_current(name: str, seed: int, unknown: Motor, known: Nameplate) -> None:
+    drive, truth = hidden.make(name, seed, unknown, known.i_max_A, connected=False)
+    found = run(drive, chosen(("phases",)), known, lambda _: None).followed
+    assert found is not None
+    print(f"{name} {seed}: {found}")
     assert found.current_A == pytest.approx(connection.SHARES[0] * known.i_max_A)
     assert found.connection.pole_pairs == truth.plant["pole_pairs"]
+    assert abs(math.remainder(found.connection.offset_rad - truth.offset_rad, turning.TURN)) < spin.ROUGH_RAD
+
+
+def swinging(pole_pairs: int, swing_hz: float) -> tuple[Array, Array]:
+    """Imposed turns there and back, and those of a rotor without friction that swings about the current."""
+    hz = np.array(connection._shares())
+    hz = np.repeat(np.concatenate((hz, -hz)) * connection.HZ, round(turning.STEP_S / STEP_S))
+    imposed = STEP_S * np.cumsum(hz)
+    turns, speed, rotor = 0.0, 0.0, []
+    for wanted in imposed:
+        speed += STEP_S * (turning.TURN * swing_hz) ** 2 * math.sin(turning.TURN * (wanted - turns)) / turning.TURN
+        turns += STEP_S * speed
+        rotor.append(turns)
+    return imposed, np.array(rotor) / pole_pairs
+
+
+@pytest.mark.parametrize(("pole_pairs", "swing_hz"), [(2, 0.7), (2, 1.0), (4, 1.3), (8, 2.5)])
+def test_a_rotor_that_swings_slowly_shows_its_pole_pairs(pole_pairs: int, swing_hz: float) -> None:
+    found = connection.followed(*swinging(pole_pairs, swing_hz), 1.0)
+    assert connection._is_right(found)
+    assert found.connection.pole_pairs == pole_pairs and not found.connection.reversed
 
 
 def test_a_folder_of_the_turning_steps_alone(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

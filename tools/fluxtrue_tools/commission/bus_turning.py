@@ -30,7 +30,7 @@ OFF_SHARE: Final = 0.01  # of i_max: a mean current so far from the wanted one h
 DIVISOR_DRAG: Final = 10  # 1 ms: the electrical angle may turn by less than half a turn between two samples
 
 
-def rotate(drive: OverTheBus, current_A: float) -> tuple[Array, Array]:
+def rotate(drive: OverTheBus, current_A: float, _: complex) -> tuple[Array, Array]:
     """Imposed angle and sensor's angle on the way there and back, both continuous, in turns."""
     steps = round(connection.RISE_S / turning.STEP_S)
     for k in range(steps):

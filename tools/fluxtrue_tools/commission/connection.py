@@ -5,6 +5,7 @@ A current vector that does not follow the rotor is turned by some electrical tur
 its magnet points to the current; how far the sensor turns meanwhile gives pole pairs and direction.
 """
 
+import cmath
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,11 +22,12 @@ from fluxtrue_tools.motor.flux_model import Array
 
 NAME = "phases"
 SHARES = (0.03, 0.06, 0.12, 0.25)  # of i_max: the smallest that the rotor follows
-TURNS = 3.0  # electrical, in each direction
+TURNS = 2.8  # electrical, in each direction
 HZ = 1.0
-RISE_S, SPEED_UP_S = 0.8, 0.5
+RISE_S, SPEED_UP_S = 0.8, 0.7
 SWING_S = 2.0  # of braking the swing before the current turns
 SWING_SHARE = 0.2  # of the current, while the rotor gains speed
+POINTS, EVEN = 200, 0.97  # of the slope, and the share of the frequency from which it counts as even
 WHOLE = 0.08  # distance of the pole pairs from a whole number
 BEHIND_RAD = math.radians(60.0)  # rms, of the rotor about the current
 STILL_TURNS = 0.1  # of the electrical turns that were imposed: less is a rotor that stands
@@ -45,27 +47,37 @@ class Followed:
     connection: Connection
 
 
-def _brake_swing(drive: Capture, current_A: float) -> None:
+def _push(drive: Capture, current_A: float, offset_A: complex) -> None:
+    """A current along the imposed d axis. The offsets of the sensors do not turn with it: at 1 Hz, about the frequency
+    of a rotor that swings about a small current, they would make it swing more and more."""
+    shown_A = current_A + offset_A * cmath.exp(-1j * drive.get("theta_e_rad"))
+    turning.currents(drive, shown_A.real, shown_A.imag)
+
+
+def _brake_swing(drive: Capture, current_A: float, offset_A: complex) -> None:
     """Take the swing about the current away: its torque accelerates the rotor with less current than it brakes it."""
     before = 0.0
     for _ in range(round(SWING_S / turning.STEP_S)):
         taken = turning.advance(drive, turning.STEP_S, NAME, ("theta_e_rad", "sensor_turns"))
         speed = abs(float(taken[-1, 1] - taken[0, 1]))
-        turning.currents(drive, current_A * (SWING_SHARE if speed > before else 1.0), 0.0)
+        _push(drive, current_A * (SWING_SHARE if speed > before else 1.0), offset_A)
         before = speed
-    turning.currents(drive, current_A, 0.0)
 
 
-def rotate(drive: Capture, current_A: float) -> tuple[Array, Array]:
-    """Imposed angle and sensor's angle on the way there and back, both continuous, in turns."""
+def rotate(drive: Capture, current_A: float, offset_A: complex) -> tuple[Array, Array]:
+    """Imposed angle and sensor's angle on the way there and back, both continuous, in turns.
+
+    offset_A   of the current sensors, stationary frame
+    """
     steps = round(RISE_S / turning.STEP_S)
     for k in range(steps):
-        turning.currents(drive, current_A * (k + 1) / steps, 0.0)
+        _push(drive, current_A * (k + 1) / steps, offset_A)
         turning.advance(drive, turning.STEP_S, NAME)
-    _brake_swing(drive, current_A)
+    _brake_swing(drive, current_A, offset_A)
     rows = []
-    for direction in (1.0, -1.0):
-        rows += [_at(drive, direction * HZ * share) for share in _shares()]
+    for hz in (direction * HZ * share for direction in (1.0, -1.0) for share in _shares()):
+        _push(drive, current_A, offset_A)
+        rows.append(_at(drive, hz))
     taken = np.vstack(rows)
     return np.unwrap(taken[:, 0]) / turning.TURN, taken[:, 1]
 
@@ -87,9 +99,28 @@ def _circular_mean(turns: Array) -> complex:
     return complex(np.exp(2j * np.pi * turns).mean())
 
 
+def _slope(imposed: Array, sensor: Array) -> float:
+    """(CM-16): of the sensor's turns over the imposed ones, while these are even.
+
+    Where the imposed angle is accelerated, a rotor that swings slowly is behind it, and overshoots where it turns back.
+    """
+    size = len(imposed) // POINTS
+    x, y = (turns[: size * POINTS].reshape(POINTS, size).mean(axis=1) for turns in (imposed, sensor))
+    hz, back = np.abs(np.gradient(x)), int(np.argmax(x))
+    along, square = 0.0, 0.0
+    for way in (slice(0, back), slice(back, POINTS)):
+        even = hz[way] > EVEN * hz.max()
+        count = np.count_nonzero(even)
+        weights = np.sqrt(np.sin(np.pi * (np.arange(count) + 0.5) / count))
+        distance = x[way][even] - np.average(x[way][even], weights=weights)
+        along += float(weights @ (distance * y[way][even]))
+        square += float(weights @ distance**2)
+    return along / square
+
+
 def followed(imposed: Array, sensor: Array, current_A: float) -> Followed:
     """(CM-16), (CM-17): the mean of both directions has no lag by friction."""
-    slope = float(np.polyfit(imposed, sensor, 1)[0])
+    slope = _slope(imposed, sensor)
     if abs(slope) < STILL_TURNS / PAIRS_MAX:
         return Followed(current_A, 0.0, math.pi, Connection(1, False, 0.0))
     pairs = max(round(1.0 / abs(slope)), 1)
@@ -106,7 +137,7 @@ def _is_right(found: Followed) -> bool:
     return abs(found.pole_pairs - round(found.pole_pairs)) < WHOLE and 0.0 < found.behind_rad < BEHIND_RAD
 
 
-def measure(drive: D, known: Nameplate, turn: Callable[[D, float], tuple[Array, Array]]) -> Followed:
+def measure(drive: D, known: Nameplate, turn: Callable[[D, float, complex], tuple[Array, Array]]) -> Followed:
     """Measure with the smallest current that the rotor follows.
 
     turn   rotate(), or that of a drive over CAN
@@ -115,7 +146,7 @@ def measure(drive: D, known: Nameplate, turn: Callable[[D, float], tuple[Array, 
     try:
         for share in SHARES:
             current_A = share * known.i_max_A
-            found = followed(*turn(drive, current_A), current_A)
+            found = followed(*turn(drive, current_A, known.offset_A), current_A)
             if _is_right(found):
                 return found
     finally:
