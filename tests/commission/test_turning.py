@@ -144,6 +144,20 @@ def test_a_rotor_that_swings_slowly_shows_its_pole_pairs(pole_pairs: int, swing_
     assert found.connection.pole_pairs == pole_pairs and not found.connection.reversed
 
 
+def test_a_machine_with_a_weak_magnet_is_accelerated_by_its_reluctance(unknown: Motor, known: Nameplate) -> None:
+    wanted = turning.SPEED_SHARE * known.speed_max_rpm * turning.TURN / 60.0
+    seconds = []
+    for currents in (spin.ALONG_Q, spin.TURNED):
+        drive, truth = hidden.make("pmasynrm", 127, unknown, known.i_max_A, connected=False)
+        wired = turning.Connection(int(truth.plant["pole_pairs"]), truth.reversed, truth.offset_rad)
+        turning.connect(drive, wired, known, "test")
+        rows = spin.accelerate(drive, known, wanted, "test", currents)
+        seconds.append(len(rows) * drive.period_s)
+        assert np.abs(rows[:, :2]).max() < 0.5 * known.i_max_A
+    print(seconds)
+    assert seconds[1] < 0.5 * seconds[0]
+
+
 def test_a_folder_of_the_turning_steps_alone(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "found"
     options = ["--motor", str(folder), "--machine", "saturated", "--seed", "101", "--step", "drag", "--out", str(out)]

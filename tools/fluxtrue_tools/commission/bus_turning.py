@@ -6,7 +6,7 @@ Therefore each window is captured, the currents are brought to zero, and the sha
 is that of software in the loop (connection.py, spin.py, drag.py).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
@@ -58,14 +58,16 @@ def rotate(drive: OverTheBus, current_A: float, _: complex) -> tuple[Array, Arra
     return imposed[turn - half : turn + half], taken[turn - half : turn + half, 1]
 
 
-def _accelerate(drive: OverTheBus, known: Nameplate, wanted_rad_s: float, step: str, reach_s: float) -> None:
+def _accelerate(
+    drive: OverTheBus, known: Nameplate, wanted_rad_s: float, step: str, currents: Sequence[complex] = spin.ALONG_Q
+) -> None:
     """From any speed, which the drive reports."""
 
     def advance() -> float:
         drive.rest(spin.TRY_S)
         return drive.shaft_rad_s()
 
-    spin.reach(drive, known, wanted_rad_s, step, reach_s, drive.shaft_rad_s(), advance)
+    spin.reach(drive, known, wanted_rad_s, step, currents, drive.shaft_rad_s(), advance)
 
 
 def _brake(drive: OverTheBus, known: Nameplate, wanted_rad_s: float) -> None:
@@ -86,7 +88,7 @@ def direction(drive: OverTheBus, known: Nameplate, wanted_rad_s: float, rough: C
     try:
         for level in spin.LEVELS:
             i_d_A = level * spin.D_SHARE * known.i_max_A
-            _accelerate(drive, known, wanted_rad_s, spin.NAME, spin.REACH_S)
+            _accelerate(drive, known, wanted_rad_s, spin.NAME, spin.TURNED)
             turning.currents(drive, i_d_A, q_A)
             drive.rest(LEVEL_SETTLE_S)
             taken.append(_window(drive, 1, lambda seconds: _and_none(drive, seconds)))
@@ -112,7 +114,7 @@ def runs(drive: OverTheBus, known: Nameplate, wanted_rad_s: float) -> tuple[list
 
     def driven(seconds: float) -> None:
         begun_s = drive.line.now_s
-        _accelerate(drive, known, wanted_rad_s, drag.NAME, drag.REACH_S)
+        _accelerate(drive, known, wanted_rad_s, drag.NAME)
         turning.currents(drive, 0.0, 0.0)
         drive.rest(max(seconds - (drive.line.now_s - begun_s), 0.0))
 
@@ -122,12 +124,12 @@ def runs(drive: OverTheBus, known: Nameplate, wanted_rad_s: float) -> tuple[list
         drive.rest(max(seconds - (drive.line.now_s - begun_s), 0.0))
 
     parts = [_window(drive, DIVISOR_DRAG, driven)]
-    _accelerate(drive, known, wanted_rad_s, drag.NAME, drag.REACH_S)
+    _accelerate(drive, known, wanted_rad_s, drag.NAME)
     turning.currents(drive, 0.0, 0.0)
     for _ in range(drag.COASTS):
         parts.append(_window(drive, DIVISOR_DRAG, drive.rest))
         if drive.shaft_rad_s() < drag.COAST_END * wanted_rad_s:
             break
-    _accelerate(drive, known, wanted_rad_s, drag.NAME, drag.REACH_S)
+    _accelerate(drive, known, wanted_rad_s, drag.NAME)
     parts.append(_window(drive, DIVISOR_DRAG, braked))
     return parts, DIVISOR_DRAG

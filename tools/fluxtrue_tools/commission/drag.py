@@ -20,7 +20,6 @@ WINDOW_S = 0.02  # over which a speed and a mean torque are formed
 COAST_S, COASTS = 0.25, 16  # the run-down ends at COAST_END of its speed
 COAST_END = 0.4
 SLOWEST = 0.1  # of the largest speed of the run: below it the drag is not evaluated
-REACH_S = 0.8
 LEAST_SHARE = 0.2  # of the largest current of the run
 D = TypeVar("D", bound=Capture)
 STEADY_SHARE = 0.05  # change of a current within a window in which it counts as steady
@@ -152,7 +151,7 @@ def _coast(drive: Capture, wanted_rad_s: float) -> Array:
 
 def runs(drive: Capture, known: Nameplate, wanted_rad_s: float) -> tuple[list[Array], int]:
     """Accelerated, without current, and braked with the current of the acceleration; PWM periods from row to row."""
-    driven = spin.accelerate(drive, known, wanted_rad_s, NAME, REACH_S)
+    driven = spin.accelerate(drive, known, wanted_rad_s, NAME)
     turning.currents(drive, 0.0, 0.0)
     coasting = _coast(drive, wanted_rad_s)
     return [driven, coasting, spin.brake(drive, known, wanted_rad_s, NAME)], 1

@@ -5,8 +5,9 @@ The machine is accelerated to a part of its speed in both directions and coasts 
 both polarities. The voltage that does not change its sign with the current is that of the magnet.
 """
 
+import cmath
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -28,9 +29,11 @@ WINDOWS = 20  # to settle a level
 LARGE = 0.75  # between the magnitudes of both levels
 COMPENSATION = "dead_time_compensation"
 Q_SHARES = (0.02, 0.04, 0.08, 0.16, 0.25, 0.4)  # of i_max: more while the machine does not accelerate
-TRY_S, REACH_S, LONGEST_S = 0.05, 1.5, 10.0
+ALONG_Q = tuple(1j * share for share in Q_SHARES)
+TURNED = (*ALONG_Q, Q_SHARES[-1] * cmath.exp(1j * math.atan2(1.0, -0.5)))  # with reluctance for a weak magnet
+TRY_S, REACH_S, LONGEST_S = 0.05, 0.8, 10.0
 ENOUGH_SHARE = 0.5  # of the wanted speed: a machine whose drag takes all of its torque before is measured there
-BRAKE_STEPS = 40  # with each of the currents
+BRAKE_STEPS = 15  # with each of the currents
 ROUGH_RAD = math.radians(4.0)  # beyond, the currents along d make torque
 STANDING_SHARE = 0.01  # of the wanted speed
 ROUNDS = 2
@@ -62,33 +65,36 @@ class Spun:
     omega_rad_s: float  # electrical, at which that was seen
 
 
-def reach(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str, slowly_s: float, speed: float,
+def reach(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str, currents: Sequence[complex], speed: float,
           advance: Callable[[], float]) -> None:  # fmt: skip
-    """Accelerate with as little current as reaches the speed in about this time.
+    """Accelerate with as little current as reaches the speed in about REACH_S.
 
     After LONGEST_S a part of the speed is enough: a weak magnet makes little torque of the largest current.
 
-    speed     mechanical, positive in the electrical direction
-    advance   lets TRY_S pass, and returns the speed then
+    currents   one after the other, as shares of i_max, d and q in the direction of the rotation: ALONG_Q or TURNED
+    speed      mechanical, positive in the electrical direction
+    advance    lets TRY_S pass, and returns the speed then
     """
-    seconds, tries, level, i_q_A = 0.0, 0, 0, 0.0
+    seconds, tries, level, i_A = 0.0, 0, 0, 0j
     sign = math.copysign(1.0, wanted_rad_s)
     while sign * speed < abs(wanted_rad_s):
         if seconds > LONGEST_S:
             if sign * speed >= ENOUGH_SHARE * abs(wanted_rad_s):
                 return
             raise FluxtrueError(f"commission: {step}: the shaft reached {abs(speed) * 30 / math.pi:.0f} rpm of "
-                                f"{abs(wanted_rad_s) * 30 / math.pi:.0f} rpm with {abs(i_q_A):.3g} A: it is coupled or "
+                                f"{abs(wanted_rad_s) * 30 / math.pi:.0f} rpm with {abs(i_A):.3g} A: it is coupled or "
                                 "blocked, or the angle is wrong")  # fmt: skip
-        i_q_A = sign * Q_SHARES[level] * known.i_max_A
-        turning.currents(drive, 0.0, i_q_A)
+        i_A = currents[level] * known.i_max_A
+        turning.currents(drive, i_A.real, sign * i_A.imag)
         before, speed = speed, advance()
         seconds, tries = seconds + TRY_S, tries + 1
-        late = sign * (speed - before) * slowly_s < 0.5 * TRY_S * abs(wanted_rad_s)
-        level = min(level + 1, len(Q_SHARES) - 1) if late and tries % 2 == 0 else level
+        late = sign * (speed - before) * REACH_S < 0.5 * TRY_S * abs(wanted_rad_s)
+        level = min(level + 1, len(currents) - 1) if late and tries % 2 == 0 else level
 
 
-def accelerate(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str, slowly_s: float = REACH_S) -> Array:
+def accelerate(
+    drive: Capture, known: Nameplate, wanted_rad_s: float, step: str, currents: Sequence[complex] = ALONG_Q
+) -> Array:
     """From a standstill; all rows are kept."""
     rows: list[Array] = []
 
@@ -96,7 +102,7 @@ def accelerate(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str,
         rows.append(turning.advance(drive, TRY_S, step))
         return turning.speed_rad_s(rows[-1][len(rows[-1]) // 2 :], drive.period_s) * _electrical_sign(drive)
 
-    reach(drive, known, wanted_rad_s, step, slowly_s, 0.0, advance)
+    reach(drive, known, wanted_rad_s, step, currents, 0.0, advance)
     return np.vstack(rows)
 
 
@@ -115,7 +121,7 @@ def stop(drive: Capture, known: Nameplate, wanted_rad_s: float, speed: Callable[
     for n in range(round(LONGEST_S / turning.STEP_S)):
         if sign * speed() < STANDING_SHARE * abs(wanted_rad_s):
             break
-        share = Q_SHARES[min(n // BRAKE_STEPS, len(Q_SHARES) - 3)]
+        share = Q_SHARES[min(n // BRAKE_STEPS, len(Q_SHARES) - 2)]
         turning.currents(drive, 0.0, -sign * share * known.i_max_A)
         advance()
     turning.currents(drive, 0.0, 0.0)
@@ -222,7 +228,7 @@ def magnet(taken: list[Array], period_s: float, offset_A: complex) -> Magnet:
 
 def direction(drive: Capture, known: Nameplate, wanted_rad_s: float, _: Connection) -> Magnet:
     """One direction: accelerated, coasting with all levels of the current, and braked."""
-    accelerate(drive, known, wanted_rad_s, NAME)
+    accelerate(drive, known, wanted_rad_s, NAME, TURNED)
     found = magnet(_coast(drive, known), drive.period_s, known.offset_A)
     brake(drive, known, wanted_rad_s, NAME)
     return found
