@@ -12,6 +12,7 @@ import pytest
 
 from fluxtrue_tools.cli import run as command
 from fluxtrue_tools.commission import hidden
+from fluxtrue_tools.commission.bursts import MOVED
 from fluxtrue_tools.commission.drive import PULSE, SoftwareInTheLoop
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import balance_error, resistance_error, score
@@ -52,6 +53,17 @@ def test_map_and_resistance_of_a_hidden_machine(name: str, seed: int, unknown: M
     assert found.largest_A <= known.i_max_A
     assert drive.get("run_state") != 1.0
     assert drive.get("fault_word") == 0.0
+
+
+def test_a_rotor_that_moves_at_a_level_is_measured_until_it_does(unknown: Motor, known: Nameplate) -> None:
+    """Where the shaft rests the harmonics of the angle sensor give the direct current a part along q: every try at
+    -0.85 i_max ends before its time."""
+    drive, truth = hidden.make("hsm1", 110, unknown, known.i_max_A, connected=False, other_errors=True)
+    found = run(drive, chosen(("drag", "resistance")), known, lambda _: None)
+    assert found.resistance is not None and any(raw.failure == MOVED for raw in found.levels)
+    error, _ = resistance_error(found.resistance.r_ohm, truth)
+    print(f"R {100 * error:+.2f} %")
+    assert abs(error) <= 2.0 * R_SHARE  # as the campaign with other errors
 
 
 @pytest.mark.parametrize(("name", "seed", "number"), DRAWS)

@@ -179,15 +179,17 @@ def solve(raws: list[Raw], psi_f_Vs: float, compensated_V: float = 0.0, noise_A:
 
 
 def _record(drive: Capture, burst: Burst, known: Nameplate) -> Raw | None:
-    """The one of the first tries that moved the rotor least; None: none has lasted as long as it should."""
-    best: Raw | None = None
+    """The one of the first tries that moved the rotor least. If the rotor has ended all of them, which an error of the
+    angle sensor where the shaft rests can do, the longest one; None: the current was too large in each."""
+    raws: list[Raw] = []
     for _ in range(TRIES):
-        raw = record(drive, burst, known)
-        if raw.failure == TIME and (best is None or raw.moved_rad < best.moved_rad):
-            best = raw
-        if best is not None and best.moved_rad < QUIET_RAD:
+        raws.append(record(drive, burst, known))
+        if raws[-1].failure == TIME and raws[-1].moved_rad < QUIET_RAD:
             break
-    return best
+    lasted = [raw for raw in raws if raw.failure == TIME]
+    if lasted:
+        return min(lasted, key=lambda raw: raw.moved_rad)
+    return max((raw for raw in raws if raw.is_valid), key=lambda raw: len(raw.i), default=None)
 
 
 def measure(drive: Capture, known: Nameplate, first: First) -> list[Raw]:
@@ -203,9 +205,7 @@ def measure(drive: Capture, known: Nameplate, first: First) -> list[Raw]:
                       periods=round(SECONDS / drive.period_s))  # fmt: skip
         raw = _record(drive, burst, known)
         if raw is None:
-            raise FluxtrueError(
-                f"commission: resistance: at {level:.3g} A: the rotor moved, or the current was too large"
-            )
+            raise FluxtrueError(f"commission: resistance: at {level:.3g} A: the current was too large")
         raws.append(raw.within(level - band, level + band))
         if len(raws[-1].i) < LEAST_PERIODS:
             raise FluxtrueError(f"commission: resistance: {level:.3g} A was not reached in time")
