@@ -11,6 +11,7 @@
 #define REFERENCE_ERROR_PERMILLE 60
 #define REFERENCE_STEPS 10U
 #define ZERO_STEPS 50
+#define EQUAL_MAX 4 /* q15: two values of measure_phases() for the same counts differ by 2 2.2 LSB at most */
 #define DEVIATION_UNLIMITED 5 /* per step while the voltage is not limited: confirmed in a fifth of the time */
 
 /* (MN-1); samples without a deviation decrease the count. current: the magnitude of the expected one. */
@@ -74,11 +75,12 @@ static uint32_t oscillation(const plausibility_config_t *config, plausibility_st
 }
 
 /* (MN-3): the phase currents sum to zero, so a phase must change by as much as the other two together. It may stay the
- * same while these change in opposite directions, for example in a machine at rest. */
+ * same while these change in opposite directions, for example in a machine at rest. The phases come from the current
+ * vector and the zero sequence, whose rounding changes a value that is repeated. */
 static bool is_sensor_stuck(const plausibility_config_t *config, uint8_t *count, int32_t change, int32_t of_others)
 {
     const int32_t change_min = config->i_dead >> 2; /* several converter counts: more than noise between two of them */
-    if (change != 0) {
+    if (fx_abs_q31(change) > EQUAL_MAX) {
         *count = 0;
     } else if (fx_abs_q31(of_others) > change_min) {
         *count = (uint8_t)fx_min_s32(*count + 1, config->equal_steps);

@@ -7,7 +7,8 @@
  *                      mean of a step, whichever is further off; each deviation limited to 4 ripple_max
  *   phase lost         i_x <= i_dead in the direction of i_x*, |i_x*| > max(i_alive, |i*|/8) + behind_gain u_behind: 8
  *                      more such samples than samples with current, each direction counted by itself
- *   sensor stuck       20 equal samples of a phase while the sum of the others changes by more than i_dead/4 in each
+ *   sensor stuck       20 samples of a phase, equal within 4 LSB, while the sum of the others changes by more than
+ *                      i_dead/4 in each
  *   mismatch           the d-axis voltage contradicts the currents, the speed and the identified machine for 70 ms
  *   over-speed         |w| > w_trip for 5 ms
  *   over-temperature   110 ms beyond the end of a derating line

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include <math.h>
+#include <stdlib.h>
 
 #include "control/current/measure.h"
 #include "fixture.h"
@@ -171,4 +172,30 @@ void test_counts_above_the_converters_width_still_give_a_current_within_range(vo
     TEST_ASSERT_INT_WITHIN(32768, 0, m.i.alpha);
     TEST_ASSERT_EQUAL_INT(0, m.i.beta);
     TEST_ASSERT_INT_WITHIN(32768, 0, m.v_dc);
+}
+
+/* The phases are computed from alpha, beta and the zero sequence. The monitor of stuck sensors relies on 4 LSB as the
+ * largest change of a phase whose converter repeats its counts while the other two move. */
+void test_a_phase_whose_counts_repeat_changes_by_at_most_4_lsb(void)
+{
+    uint64_t seed = 23;
+    int32_t largest = 0;
+    for (int n = 0; n < 2000; n++) {
+        const uint16_t count = (uint16_t)random_in(&seed, 1500, 2600);
+        for (int x = 0; x < 3; x++) {
+            abc_q15_t i[2];
+            for (int k = 0; k < 2; k++) {
+                uint16_t of[3];
+                for (int y = 0; y < 3; y++) {
+                    of[y] = (y == x) ? count : (uint16_t)random_in(&seed, 1500, 2600);
+                }
+                const adc_counts_t counts = {of[0], of[1], of[2], 0};
+                i[k] = phases(&counts);
+            }
+            const int32_t change[3] = {i[1].a - i[0].a, i[1].b - i[0].b, i[1].c - i[0].c};
+            largest = (abs(change[x]) > largest) ? abs(change[x]) : largest;
+        }
+    }
+    TEST_ASSERT_INT_WITHIN(4, 0, largest);
+    TEST_ASSERT_GREATER_THAN_INT(0, largest);
 }

@@ -320,8 +320,24 @@ void test_a_sensor_that_repeats_itself_20_times_while_the_others_sum_moves_is_st
 void test_a_sensor_that_changes_after_19_equal_samples_is_not_stuck(void)
 {
     for (int n = 0; n < 1000; n++) {
-        const int32_t moves = (n & 1) ? 3000 : 3101, repeated = 5000 + n / 20;
+        const int32_t moves = (n & 1) ? 3000 : 3101, repeated = 5000 + 5 * (n / 20);
         in.phases = in.phases_ref = (abc_q15_t){repeated, -2 * moves, 3 * moves};
+        TEST_ASSERT_EQUAL_HEX32(0, plausibility_step(&config, &state, &in) & FAULT_CURRENT_STUCK);
+    }
+}
+
+/* The rounding of measure_phases() changes a repeated value by up to 4 LSB (test_measure.c). */
+void test_a_sensor_that_repeats_itself_within_the_rounding_of_the_phases_is_stuck(void)
+{
+    for (int n = 1; n <= 20; n++) {
+        in.phases = in.phases_ref = (abc_q15_t){5000 + 4 * (n & 1), -6000 - 202 * (n & 1), 9000 + 303 * (n & 1)};
+        TEST_ASSERT_EQUAL_HEX32(0, plausibility_step(&config, &state, &in) & FAULT_CURRENT_STUCK);
+    }
+    in.phases = in.phases_ref = (abc_q15_t){5004, -6202, 9303};
+    TEST_ASSERT_EQUAL_HEX32(FAULT_CURRENT_STUCK, plausibility_step(&config, &state, &in) & FAULT_CURRENT_STUCK);
+    setUp();
+    for (int n = 0; n < 1000; n++) {
+        in.phases = in.phases_ref = (abc_q15_t){5000 + 5 * (n & 1), -6000 - 202 * (n & 1), 9000 + 303 * (n & 1)};
         TEST_ASSERT_EQUAL_HEX32(0, plausibility_step(&config, &state, &in) & FAULT_CURRENT_STUCK);
     }
 }
