@@ -69,11 +69,27 @@ acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
     return (acquired_t){angle.step, normal};
 }
 
+/* Over-voltage by the last two samples before this one, and whether such a rise can be the link's. */
+static uint32_t check_rise(drive_t *drive, int32_t v_dc, uint32_t of_sample)
+{
+    const monitor_config_t *config = &drive->period.monitor;
+    const uint32_t generation = drive->samples.generation; /* of the last sample */
+    const int32_t last = sample_box_at(&drive->samples, generation)->v_dc;
+    const int32_t before = sample_box_at(&drive->samples, generation - 1U)->v_dc;
+    const bool expected = monitor_is_over_voltage_expected(config, v_dc, last, before);
+    const uint32_t faults = expected ? of_sample | FAULT_OVER_VOLTAGE : of_sample;
+    if ((faults & ~drive->fast.faults & FAULT_OVER_VOLTAGE) != 0U) {
+        drive->fast.short_circuit.ignores_voltage = monitor_is_rise_of_sensor(config, last, before);
+    }
+    return faults;
+}
+
 void acquire_check(drive_t *drive, const sample_t *sample, bool run)
 {
+    const monitor_config_t *config = &drive->period.monitor;
     const monitor_in_t in = {.i = measure_phases(sample->i_ab, sample->zero_q28), .v_dc = sample->v_dc};
-    const uint32_t faults = monitor_step(&drive->period.monitor, &drive->fast.monitor, &in);
-    if (in.v_dc < drive->period.monitor.v_min) {
+    const uint32_t faults = check_rise(drive, in.v_dc, monitor_step(config, &drive->fast.monitor, &in));
+    if (in.v_dc < config->v_min) {
         /* Below v_min the applied voltage is unknown; the three-period count starts again. */
         drive->fast.periods_since_enable = 0;
     }

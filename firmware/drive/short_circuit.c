@@ -136,8 +136,9 @@ void short_circuit_reset(fast_state_t *fast)
     };
 }
 
-bool short_circuit_is_needed(uint32_t faults, safe_t safe)
+bool short_circuit_is_needed(const fast_state_t *fast, safe_t safe)
 {
+    const uint32_t faults = fast->faults & ~(fast->short_circuit.ignores_voltage ? (uint32_t)FAULT_OVER_VOLTAGE : 0U);
     const bool on_over_voltage = safe == SAFE_SHORT_ON_OVER_VOLTAGE || safe == SAFE_SHORT_ON_EITHER;
     const bool on_gate_fault = safe == SAFE_SHORT_ON_GATE_FAULT || safe == SAFE_SHORT_ON_EITHER;
     return safe == SAFE_SHORT_CIRCUIT || (on_over_voltage && (faults & FAULT_OVER_VOLTAGE) != 0U) ||

@@ -38,7 +38,8 @@ void short_circuit_end(fast_state_t *fast);
 /** Permits both sides again, after the faults have been reset. A side that the search has found is kept. */
 void short_circuit_reset(fast_state_t *fast);
 
-/** Whether the fault that is latched needs the short circuit. */
-bool short_circuit_is_needed(uint32_t faults, safe_t safe);
+/** Whether the latched faults need the short circuit. An over-voltage that a jump of the sensor has caused counts as
+ * none (MN-50). */
+bool short_circuit_is_needed(const fast_state_t *fast, safe_t safe);
 
 #endif

@@ -7,6 +7,8 @@
 enum { OVER_VOLTAGE_SAMPLES = 2, UNDER_VOLTAGE_SAMPLES = 10, CURRENT_SUM_SAMPLES = 5 };
 /* Added to the angle's count for an implausible sample: a disturbance may last 5 ms, single samples be rare (MN-21). */
 enum { ANGLE_JUMP = 4, ANGLE_FIRST_JUMP = 40 };
+/* The link's voltage rises by less than this part of v_max in a period (MN-50). */
+enum { LINK_RISE_PART = 6 };
 
 /* |x| > limit by one unsigned comparison. */
 static bool exceeds(int32_t x, int32_t limit)
@@ -47,4 +49,14 @@ uint32_t monitor_step(const monitor_config_t *config, monitor_state_t *state, co
     faults |= count_angle_jumps(config, state, jumped);
     state->pending = pending(state, jumped);
     return faults;
+}
+
+bool monitor_is_over_voltage_expected(const monitor_config_t *config, int32_t v_dc, int32_t last, int32_t before)
+{
+    return v_dc > config->v_max && 2 * last - before > config->v_max;
+}
+
+bool monitor_is_rise_of_sensor(const monitor_config_t *config, int32_t last, int32_t before)
+{
+    return before >= config->v_min && LINK_RISE_PART * (last - before) > config->v_max;
 }

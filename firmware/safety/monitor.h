@@ -2,11 +2,12 @@
 #ifndef SAFETY_MONITOR_H
 #define SAFETY_MONITOR_H
 /** Monitors of the fast ISR: faults from one set of samples and a few counters, without side effects.
- *   over-current  any |i_x| > i_trip in one sample;          over-voltage  v_dc > v_max for 2 samples
+ *   over-current  any |i_x| > i_trip in one sample;          over-voltage  v_dc > v_max for 2 samples, or for 1 that
+ *                 the two before it led to
  *   under-voltage v_dc < v_min for 10 samples;               current sum   |i_a + i_b + i_c| > sum_max for 5 samples
  *   angle         implausible samples of the angle, reported by the angle tracker: each adds 4 to a count, the first
  *                 after a good one 36 more, and a good one takes 1 away; at 30 ms of periods it is a fault
- * Source   docs/architecture.md, fault table; docs/theory/monitors.md (MN-21)
+ * Source   docs/architecture.md, fault table; docs/theory/monitors.md (MN-21), (MN-49), (MN-50)
  * Units    per unit
  * Range    i_trip < 0.8: the trip comes before the converter saturates
  * Errors   returns the set of faults that are confirmed now; the fast ISR latches them
@@ -62,5 +63,12 @@ static inline void monitor_report_angle_jump(monitor_state_t *state)
 }
 
 uint32_t monitor_step(const monitor_config_t *config, monitor_state_t *state, const monitor_in_t *in);
+
+/** Whether the last two samples of the dc voltage before this one led to its over-voltage by a straight line (MN-49):
+ * then the first sample confirms it. v_dc, last, before: q15. */
+bool monitor_is_over_voltage_expected(const monitor_config_t *config, int32_t v_dc, int32_t last, int32_t before);
+
+/** Whether the dc voltage rose faster between two samples than a link can (MN-50), so that the sensor is wrong. */
+bool monitor_is_rise_of_sensor(const monitor_config_t *config, int32_t last, int32_t before);
 
 #endif

@@ -102,6 +102,24 @@ void test_over_voltage_needs_two_samples_in_a_row(void)
     TEST_ASSERT_EQUAL_HEX32(0, step() | step() | step());
 }
 
+void test_an_over_voltage_is_expected_if_the_last_two_samples_led_to_it_by_a_straight_line(void)
+{
+    TEST_ASSERT_TRUE(monitor_is_over_voltage_expected(&config, 28001, 27000, 25999));
+    TEST_ASSERT_FALSE(monitor_is_over_voltage_expected(&config, 28001, 27000, 26000)); /* just to the limit */
+    TEST_ASSERT_FALSE(monitor_is_over_voltage_expected(&config, 28000, 27000, 25999));
+    TEST_ASSERT_FALSE(monitor_is_over_voltage_expected(&config, 28001, 26000, 27000)); /* a spike after a fall */
+}
+
+/* A sixth of 28000 is 4666.7. Below v_min: an empty link, or no sample yet. */
+void test_a_dc_voltage_that_rises_faster_than_a_link_can_is_of_a_wrong_sensor(void)
+{
+    TEST_ASSERT_TRUE(monitor_is_rise_of_sensor(&config, 29667, 25000));
+    TEST_ASSERT_FALSE(monitor_is_rise_of_sensor(&config, 29666, 25000));
+    TEST_ASSERT_FALSE(monitor_is_rise_of_sensor(&config, 25000, 29667));
+    TEST_ASSERT_TRUE(monitor_is_rise_of_sensor(&config, 30000, 10000));
+    TEST_ASSERT_FALSE(monitor_is_rise_of_sensor(&config, 30000, 9999));
+}
+
 void test_under_voltage_needs_ten_samples_in_a_row(void)
 {
     monitor_in_t bad = in;
