@@ -118,6 +118,8 @@ void test_a_dc_voltage_that_rises_faster_than_a_link_can_is_of_a_wrong_sensor(vo
     TEST_ASSERT_FALSE(monitor_is_rise_of_sensor(&config, 25000, 29667));
     TEST_ASSERT_TRUE(monitor_is_rise_of_sensor(&config, 30000, 10000));
     TEST_ASSERT_FALSE(monitor_is_rise_of_sensor(&config, 30000, 9999));
+    const monitor_config_t even = {.v_max = 28002};
+    TEST_ASSERT_FALSE(monitor_is_rise_of_sensor(&even, 29667, 25000)); /* just a sixth */
 }
 
 void test_under_voltage_needs_ten_samples_in_a_row(void)
