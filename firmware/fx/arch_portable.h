@@ -104,6 +104,11 @@ static inline uint32_t fx_arch_pkhbt(int32_t lo, int32_t hi)
 }
 
 /* The upper halves of both words. */
+static inline uint32_t fx_arch_pkhbt_unshifted(int32_t lo, int32_t hi)
+{
+    return ((uint32_t)lo & 0xFFFFU) | ((uint32_t)hi & 0xFFFF0000U);
+}
+
 static inline uint32_t fx_arch_pkhtb(int32_t hi, int32_t lo)
 {
     return ((uint32_t)hi & 0xFFFF0000U) | ((uint32_t)lo >> 16);

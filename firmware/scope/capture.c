@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "scope/capture.h"
 
+#include "fx/codegen.h"
 #include "scope/columns.h"
 #include "scope/trigger.h"
 
@@ -20,7 +21,7 @@ bool capture_config_is_valid(const capture_config_t *config)
            config->before < config->samples && (uint32_t)config->samples * config->signals <= CAPTURE_MEMORY;
 }
 
-static void begin(capture_t *capture, const capture_config_t *config, capture_state_t state)
+static FX_NOT_INLINED FX_COLD void begin(capture_t *capture, const capture_config_t *config, capture_state_t state)
 {
     const uint16_t number = (uint16_t)(capture->number + 1U);
     *capture = (capture_t){.config = *config, .state = (uint8_t)state, .number = number};
@@ -52,6 +53,7 @@ void capture_trigger(capture_t *capture, uint32_t period)
 {
     if (capture->state == CAPTURE_ARMED) {
         capture->asked = true;
+        capture->plain = false;
         capture->asked_for = period;
     }
 }
@@ -61,7 +63,7 @@ void capture_stop(capture_t *capture)
     capture->state = CAPTURE_IDLE;
 }
 
-static void begin_after(capture_t *capture)
+static FX_NOT_INLINED FX_COLD void begin_after(capture_t *capture)
 {
     const capture_config_t *config = &capture->config;
     const uint32_t before = lesser(capture->filled, config->before);
@@ -82,26 +84,14 @@ static uint32_t contiguous(const capture_t *capture, uint32_t newest)
                   (uint32_t)capture->config.samples - capture->at);
 }
 
-static void take(capture_t *capture, int16_t *memory, const capture_source_t *source, uint32_t count)
+static void take(capture_t *capture, int16_t *memory, const capture_source_t *source, const sample_t *next,
+                 uint32_t count)
 {
     const capture_config_t *config = &capture->config;
-    if (count == 0U) {
-        return; /* the trigger is the next sample */
-    }
-    columns_copy(capture, &memory[(size_t)capture->at * config->signals], source, count);
+    const uint32_t at = capture->at;
+    columns_copy(capture, &memory[at * config->signals], next, source->step, count);
     capture->next += count * config->divisor;
-    capture->at = (uint16_t)(capture->at + count);
-    if (capture->at == config->samples) {
-        capture->at = 0;
-    }
-}
-
-static void count_armed(capture_t *capture, uint32_t count, bool found)
-{
-    capture->filled = (uint16_t)lesser(capture->filled + count, capture->config.samples);
-    if (found) {
-        begin_after(capture);
-    }
+    capture->at = (uint16_t)((at + count == config->samples) ? 0U : at + count);
 }
 
 static void count_triggered(capture_t *capture, uint32_t count)
@@ -116,19 +106,21 @@ static void record(capture_t *capture, int16_t *memory, const capture_source_t *
 {
     const bool armed = capture->state == CAPTURE_ARMED;
     const uint32_t readable = contiguous(capture, source->newest);
-    bool found = false;
-    const uint32_t count = armed ? trigger_search(capture, source, readable, &found)
+    const sample_t *next = &source->slot[capture->next % SAMPLE_SLOTS];
+    const uint32_t count = armed ? trigger_search(capture, next, source->step, readable)
                                  : lesser(readable, capture->remaining);
-    take(capture, memory, source, count);
-    if (armed) {
-        count_armed(capture, count, found);
-    } else {
+    if (count > 0U) { /* else the trigger is the next sample */
+        take(capture, memory, source, next, count);
+    }
+    if (!armed) {
         count_triggered(capture, count);
+    } else if (count < readable) {
+        begin_after(capture);
     }
 }
 
 /* The ring no longer contains the next period: the capture ends early, or the search begins again. */
-static void skip_lost_periods(capture_t *capture, uint32_t newest)
+static FX_NOT_INLINED FX_COLD void skip_lost_periods(capture_t *capture, uint32_t newest)
 {
     capture->lost++;
     if (capture->state == CAPTURE_ARMED) {
@@ -143,8 +135,8 @@ static void skip_lost_periods(capture_t *capture, uint32_t newest)
 
 void capture_step(capture_t *capture, int16_t *memory, const capture_source_t *source)
 {
-    while ((capture->state == CAPTURE_ARMED || capture->state == CAPTURE_TRIGGERED) &&
-           (int32_t)(source->newest - capture->next) >= 0) {
+    while ((int32_t)(source->newest - capture->next) >= 0 &&
+           (capture->state == CAPTURE_ARMED || capture->state == CAPTURE_TRIGGERED)) {
         if (source->newest - capture->next >= USABLE) {
             skip_lost_periods(capture, source->newest);
         } else {

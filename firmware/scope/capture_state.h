@@ -76,7 +76,9 @@ typedef struct {
     uint8_t trigger_place;              /* of the trigger's signal: of the step from sizeof(sample_t) on */
     int8_t trigger_sign;                /* 1, or -1: triggers downwards */
     bool uses_step;                     /* one of the signals, or the trigger's, is a value of the step */
+    bool usual;                         /* SCOPE_USUAL_SIGNALS, in this order and no others */
     bool asked;
+    bool plain; /* armed, and only a level in the samples of every period is waited for */
     bool ready; /* reaching the level triggers: before an edge, the signal has been on the other side of it */
 } capture_t;
 

@@ -5,8 +5,7 @@
 
 static const capture_config_t freeze_frame = {
     .signals = 8,
-    .signal = {CAPTURE_i_d_A, CAPTURE_i_q_A, CAPTURE_u_d_V, CAPTURE_u_q_V, CAPTURE_v_dc_V, CAPTURE_omega_rad_s,
-               CAPTURE_theta_e_deg, CAPTURE_i_zero_A},
+    .signal = SCOPE_USUAL_SIGNALS,
     .trigger = TRIGGER_FAULT,
     .divisor = 1,
     .samples = SCOPE_FREEZE_SAMPLES,
@@ -136,7 +135,7 @@ static void end_fault(capture_t *capture)
     }
 }
 
-static void follow_fault(scope_t *scope, bool fault, uint32_t period, uint32_t newest)
+static FX_NOT_INLINED FX_COLD void follow_fault(scope_t *scope, bool fault, uint32_t period, uint32_t newest)
 {
     if (fault) {
         begin_fault(&scope->capture, period, newest);

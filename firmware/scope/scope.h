@@ -37,7 +37,7 @@ typedef struct {
     capture_config_t setup;     /* as the commands have left it; acts when it is armed */
     scope_step_values_t values; /* of the command before the last */
     bool fault;                 /* in the last step */
-    int16_t memory[CAPTURE_MEMORY];
+    FX_WORD_ALIGNED int16_t memory[CAPTURE_MEMORY];
 } scope_t;
 
 /** command: without the protocol's own code. */

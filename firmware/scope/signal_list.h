@@ -32,4 +32,11 @@
     X(torque_estimated_Nm, TORQUE, STEP(torque_estimated), "Estimated air-gap torque") \
     X(psi_error_Vs, FLUX, STEP(psi_error), "Identified error of psi_d that is fed forward")
 
+/** Those of the freeze frame, which tools also capture unless others are chosen. */
+#define SCOPE_USUAL_SIGNALS \
+    { \
+        CAPTURE_i_d_A, CAPTURE_i_q_A, CAPTURE_u_d_V, CAPTURE_u_q_V, CAPTURE_v_dc_V, CAPTURE_omega_rad_s, \
+            CAPTURE_theta_e_deg, CAPTURE_i_zero_A \
+    }
+
 #endif

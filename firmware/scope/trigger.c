@@ -21,17 +21,18 @@ void trigger_reset(capture_t *capture)
     capture->trigger_sign = downwards ? -1 : 1;
     capture->trigger_offset = downwards ? config->level : -config->level;
     capture->ready = !is_edge(capture);
+    capture->plain = false;
 }
 
-static condition_t condition(const capture_t *capture, const capture_source_t *source)
+static condition_t condition(const capture_t *capture, column_t values)
 {
-    return (condition_t){column_of_trigger(capture, source), capture->trigger_sign, capture->trigger_offset};
+    return (condition_t){values, capture->trigger_sign, capture->trigger_offset};
 }
 
 /* x < 0 is the same as -x - 1 >= 0. */
-static condition_t negated(condition_t condition)
+static condition_t negated(const condition_t *condition)
 {
-    return (condition_t){condition.values, -condition.sign, -condition.offset - 1};
+    return (condition_t){condition->values, -condition->sign, -condition->offset - 1};
 }
 
 /* Negative: the value does not reach the condition. */
@@ -40,25 +41,12 @@ static inline int32_t beyond(const condition_t *condition, const uint8_t *value)
     return condition->sign * value_at(value) + condition->offset;
 }
 
-/* The samples before the first that reaches the condition. The conjunction of several differences is negative if all
- * are: they are searched with one branch. */
-static uint32_t count_until(const condition_t *condition, uint32_t from, uint32_t count)
+/* The samples before the first that reaches the condition. */
+static FX_NOT_INLINED uint32_t count_until(const condition_t *condition, uint32_t from, uint32_t count)
 {
     const size_t stride = condition->values.stride;
     const uint8_t *value = &condition->values.from[from * stride];
     uint32_t k = from;
-    while (k + SEARCHED_AT_ONCE <= count) {
-        int32_t signs = beyond(condition, value);
-        FX_UNROLLED
-        for (uint32_t j = 1; j < SEARCHED_AT_ONCE; j++) {
-            signs &= beyond(condition, &value[j * stride]);
-        }
-        if (signs >= 0) {
-            break;
-        }
-        value = &value[SEARCHED_AT_ONCE * stride];
-        k += SEARCHED_AT_ONCE;
-    }
     while (k < count && beyond(condition, value) < 0) {
         value = &value[stride];
         k++;
@@ -66,25 +54,50 @@ static uint32_t count_until(const condition_t *condition, uint32_t from, uint32_
     return k;
 }
 
-static uint32_t search(capture_t *capture, const capture_source_t *source, uint32_t count)
+/* The same in the samples of successive periods, from the first. The conjunction of several differences is negative if
+ * all are: they are searched with one branch. */
+static inline FX_INLINED_IF_OPTIMISED uint32_t count_until_in_periods(const condition_t *condition, uint32_t count)
 {
-    const condition_t reached = condition(capture, source);
-    uint32_t from = 0;
-    if (!capture->ready) {
-        const condition_t below = negated(reached);
-        from = count_until(&below, 0, count);
-        capture->ready = from < count;
+    const uint8_t *value = condition->values.from;
+    uint32_t k = 0;
+    for (; k + SEARCHED_AT_ONCE <= count; k += SEARCHED_AT_ONCE) {
+        int32_t signs = beyond(condition, value);
+        FX_UNROLLED
+        for (uint32_t j = 1; j < SEARCHED_AT_ONCE; j++) {
+            signs &= beyond(condition, &value[j * sizeof(sample_t)]);
+        }
+        if (signs >= 0) {
+            break;
+        }
+        value = &value[SEARCHED_AT_ONCE * sizeof(sample_t)];
     }
-    return count_until(&reached, from, count);
+    while (k < count && beyond(condition, value) < 0) {
+        value = &value[sizeof(sample_t)];
+        k++;
+    }
+    return k;
 }
 
-/* Passes over samples without searching them; the last one is kept, because an edge may follow it. */
-static void skip(capture_t *capture, const capture_source_t *source, uint32_t count)
+/* Passes over the samples that must lie before the trigger; the last one counts, because an edge may follow it. */
+static uint32_t pass_over(capture_t *capture, const condition_t *reached, uint32_t count)
 {
-    if (is_edge(capture)) {
-        const condition_t reached = condition(capture, source);
-        capture->ready = count_until(&reached, count - 1U, count) == count;
+    const capture_config_t *config = &capture->config;
+    const uint32_t over = lesser(count, (uint32_t)config->before - lesser(capture->filled, config->before));
+    if (over > 0U && is_edge(capture)) {
+        capture->ready = count_until(reached, over - 1U, over) == over;
     }
+    return over;
+}
+
+static uint32_t search(capture_t *capture, const condition_t *reached, uint32_t from, uint32_t count)
+{
+    uint32_t k = from;
+    if (!capture->ready) {
+        const condition_t below = negated(reached);
+        k = count_until(&below, from, count);
+        capture->ready = k < count;
+    }
+    return count_until(reached, k, count);
 }
 
 /* Number of samples from the next one until the trigger that a command or a fault has requested. */
@@ -95,22 +108,38 @@ static uint32_t until_asked(const capture_t *capture)
     return (periods <= 0) ? 0U : ((uint32_t)periods + divisor - 1U) / divisor;
 }
 
-uint32_t trigger_search(capture_t *capture, const capture_source_t *source, uint32_t count, bool *found)
+static uint32_t until_trigger(capture_t *capture, const condition_t *reached, uint32_t count)
+{
+    const uint32_t over = pass_over(capture, reached, count);
+    const uint32_t until = (capture->config.trigger >= TRIGGER_RISING) ? search(capture, reached, over, count) : count;
+    return capture->asked ? lesser(until, until_asked(capture)) : until;
+}
+
+/* From now on only a level in the samples of every period is waited for. */
+static bool is_plain(const capture_t *capture)
 {
     const capture_config_t *config = &capture->config;
-    uint32_t until = count;
-    *found = false;
-    if (capture->filled < config->before) {
-        until = lesser(count, (uint32_t)config->before - capture->filled);
-        skip(capture, source, until);
-    } else if (config->trigger >= TRIGGER_RISING) {
-        until = search(capture, source, count);
-        *found = until < count;
-    }
-    const uint32_t asked = capture->asked ? until_asked(capture) : count;
-    if (asked < count && asked <= until) {
-        until = asked;
-        *found = true;
-    }
+    return capture->ready && !capture->asked && capture->filled >= config->before &&
+           config->trigger >= TRIGGER_RISING && config->divisor == 1U && capture->trigger_place < sizeof(sample_t);
+}
+
+/* Not inlined: the usual search needs fewer registers. */
+static FX_NOT_INLINED uint32_t search_any(capture_t *capture, const sample_t *next, const scope_step_values_t *step,
+                                          uint32_t count)
+{
+    const condition_t reached = condition(capture, column_of_trigger(capture, next, step));
+    const uint32_t until = until_trigger(capture, &reached, count);
+    capture->filled = (uint16_t)lesser(capture->filled + until, capture->config.samples);
+    capture->plain = is_plain(capture);
     return until;
+}
+
+uint32_t trigger_search(capture_t *capture, const sample_t *next, const scope_step_values_t *step, uint32_t count)
+{
+    if (!capture->plain) {
+        return search_any(capture, next, step, count);
+    }
+    const column_t values = {(const uint8_t *)next + capture->trigger_place, sizeof(sample_t)};
+    const condition_t reached = condition(capture, values);
+    return count_until_in_periods(&reached, count);
 }

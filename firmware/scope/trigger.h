@@ -11,8 +11,8 @@
 
 /** Before an edge can trigger, the signal must have been on the other side of the level. */
 void trigger_reset(capture_t *capture);
-/** The samples before the trigger, at most `count`, from the next period on; *found: the trigger comes after them. The
- * search begins when enough samples lie before it; a command or a fault is not kept waiting. */
-uint32_t trigger_search(capture_t *capture, const capture_source_t *source, uint32_t count, bool *found);
+/** The samples before the trigger, from the next period on; `count` if it is not among as many. The search begins when
+ * enough samples lie before it; a command or a fault is not kept waiting. */
+uint32_t trigger_search(capture_t *capture, const sample_t *next, const scope_step_values_t *step, uint32_t count);
 
 #endif

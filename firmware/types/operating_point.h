@@ -18,9 +18,9 @@ typedef struct {
 } flux_point_t;
 
 typedef struct {
+    flux_point_t flux; /* at i */
     dq_q15_t i;        /* sampled at the start of this period */
     dq_q15_t u;        /* acts during this period, in the frame of its middle */
-    flux_point_t flux; /* at i */
     q31_t omega;       /* electrical speed */
 } operating_point_t;
 

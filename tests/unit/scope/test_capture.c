@@ -12,7 +12,7 @@
 
 static sample_t ring[SAMPLE_SLOTS];
 static scope_step_values_t values;
-static int16_t memory[CAPTURE_MEMORY];
+static _Alignas(int32_t) int16_t memory[CAPTURE_MEMORY];
 static int16_t written[PERIODS]; /* i_q of each period */
 static uint32_t newest, offset;  /* of the periods' numbers */
 static capture_t capture;
@@ -33,6 +33,10 @@ static void write_period(uint32_t n, int16_t i_q)
     slot->point.i.d = (int16_t)n;
     slot->point.omega = (int32_t)(n << 16 | 0xFFFFU);
     slot->v_dc = -(int16_t)n;
+    slot->point.u.d = (int16_t)(n + 1000U);
+    slot->point.u.q = -(int16_t)(n + 2000U);
+    slot->theta_e = (n + 3000U) << 16 | 0x1234U;
+    slot->zero_q28 = -(int32_t)(n + 4000U) * 65536 + 0x4321;
 }
 
 static void run(uint32_t periods)
@@ -381,6 +385,96 @@ void test_every_number_of_signals(void)
             }
         }
     }
+}
+
+static void expect_usual(uint32_t row, uint32_t period)
+{
+    const int16_t n = (int16_t)period;
+    const int16_t expected[] = {n, written[period],     (int16_t)(n + 1000), (int16_t)(-n - 2000), (int16_t)-n,
+                                n, (int16_t)(n + 3000), (int16_t)(-n - 4000)};
+    for (uint32_t k = 0; k < CAPTURE_SIGNALS_MAX; k++) {
+        TEST_ASSERT_EQUAL_INT16(expected[k], sample(k, row));
+    }
+}
+
+static void choose_the_usual(void)
+{
+    const uint8_t chosen[] = SCOPE_USUAL_SIGNALS;
+    config.signals = CAPTURE_SIGNALS_MAX;
+    memcpy(config.signal, chosen, sizeof chosen);
+}
+
+static void expect_usual_periods(void)
+{
+    TEST_ASSERT_EQUAL(CAPTURE_DONE, capture.state);
+    for (uint32_t k = 0; k < capture.taken; k++) {
+        expect_usual(k, trigger_period() + k * config.divisor - (uint32_t)capture.before * config.divisor);
+    }
+}
+
+/* They are copied by words: each of them is in its place, whatever number of rows a step copies. */
+void test_the_usual_signals_in_steps_of_every_length(void)
+{
+    for (uint32_t length = 1; length <= 60; length++) {
+        setUp();
+        choose_the_usual();
+        arm_for(TRIGGER_RISING, 0);
+        TEST_ASSERT_TRUE(capture.usual);
+        while (capture.state != CAPTURE_DONE) {
+            run(length);
+            step();
+        }
+        TEST_ASSERT_EQUAL_UINT32(75, trigger_period());
+        expect_usual_periods();
+    }
+}
+
+/* Another order, fewer signals and a divisor are not the usual case. */
+void test_signals_that_are_not_the_usual(void)
+{
+    choose_the_usual();
+    config.divisor = 3;
+    arm_for(TRIGGER_MANUAL, 0);
+    TEST_ASSERT_FALSE(capture.usual);
+    run_steps(30);
+    capture_trigger(&capture, newest + 1U);
+    run_steps(30);
+    expect_usual_periods();
+    config.divisor = 1;
+    config.signals = CAPTURE_SIGNALS_MAX - 1U;
+    arm();
+    TEST_ASSERT_FALSE(capture.usual);
+    config.signals = CAPTURE_SIGNALS_MAX;
+    config.signal[7] = CAPTURE_i_alpha_A;
+    arm();
+    TEST_ASSERT_FALSE(capture.usual);
+}
+
+/* Several samples are searched at once when enough lie before and nothing but a level is waited for. */
+void test_what_is_searched_at_once(void)
+{
+    arm_for(TRIGGER_ABOVE, NEVER);
+    run_steps(2);
+    TEST_ASSERT_FALSE(capture.plain); /* 20 samples, and 25 must lie before */
+    run_steps(1);
+    TEST_ASSERT_TRUE(capture.plain);
+    capture_trigger(&capture, newest + 4U);
+    TEST_ASSERT_FALSE(capture.plain);
+    arm_for(TRIGGER_RISING, -30000); /* no edge: the signal is never below */
+    run_steps(10);
+    TEST_ASSERT_FALSE(capture.plain);
+    arm_for(TRIGGER_MANUAL, 0);
+    run_steps(10);
+    TEST_ASSERT_FALSE(capture.plain);
+    config.divisor = 2;
+    arm_for(TRIGGER_ABOVE, NEVER);
+    run_steps(10);
+    TEST_ASSERT_FALSE(capture.plain);
+    config.divisor = 1;
+    config.trigger_signal = CAPTURE_i_d_ref_A;
+    arm_for(TRIGGER_ABOVE, NEVER);
+    run_steps(10);
+    TEST_ASSERT_FALSE(capture.plain);
 }
 
 void test_eight_signals_of_all_kinds(void)
