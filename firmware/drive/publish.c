@@ -75,14 +75,10 @@ void publish_sample(drive_t *drive, const sample_t *sample)
         return;
     }
     drive->psi_d_error = drive->task.psi_d_error;
-    const identify_sample_t in = {
-        .i = sample->point.i,
-        .u = sample->point.u,
-        .flux = &sample->point.flux,
-        .theta = sample->theta_e,
-    };
+    identify_sample_t in = {.i = sample->point.i, .u = sample->point.u, .flux = &sample->point.flux};
     identify_window_add(&fast->window, &in);
     if (completes_step) {
+        in.theta = sample->theta_e; /* not read in the other periods */
         const uint32_t periods = drive->period.periods_per_step;
         identify_window_end(&fast->window, &in);
         hand_over_window(drive, generation, periods);

@@ -46,7 +46,7 @@ static volatile union {
 static bool started; /* the PWM, and with it the fast ISR */
 
 /* The gate driver's flag is cleared first and the fault raised afterwards, so that a fault in between is not lost. */
-static FX_NOT_INLINED FX_COLD void alarms_take(void)
+static void alarms_take(void)
 {
     if (alarms.gate_driver) {
         alarms.gate_driver = false;
@@ -64,14 +64,27 @@ static FX_NOT_INLINED FX_COLD void alarms_take(void)
     }
 }
 
-void adc_handler(void)
+static inline FX_INLINED void run_period(void)
 {
-    if (alarms.any != 0U) {
-        alarms_take();
-    }
     fast_isr(&ecu.drive);
     if (angle_fault()) {
         drive_raise_fault(&ecu.drive, FAULT_ANGLE);
+    }
+}
+
+/* Apart from the handler: without alarms, which are rare, it saves no registers of its own. */
+static FX_NOT_INLINED FX_COLD void run_period_after_alarms(void)
+{
+    alarms_take();
+    run_period();
+}
+
+void adc_handler(void)
+{
+    if (alarms.any != 0U) {
+        run_period_after_alarms();
+    } else {
+        run_period();
     }
 }
 
