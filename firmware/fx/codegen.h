@@ -13,6 +13,8 @@
  *                     hal/s32k144/angle_quadrature.c                   1
  *   fx_both_loaded    window, sums stored together                     2
  *                     modulation: slopes, gains           1 each       1, 0
+ *                     current control, integrators        1            1
+ *                     flux tables, magnet's flux and g                 3
  *   fx_in_register    current control, speed              2            4
  *                     modulation: level, half a duty      3 each       1, 2
  *                     modulation: limited pulses          up to 3      up to 2
@@ -30,7 +32,7 @@
  *   FX_NOT_INLINED            210 bytes of the control library; the fast ISR would have 1 less without
  *   FX_INLINED                104 instructions of the 1 kHz task
  *   FX_INLINES_CALLS          108 instructions of the fast ISR
- *   fx_load_nine_words        40 instructions of a step of the scope, with fx_store_four_words
+ *   fx_load_nine_words        35 instructions of a step of the scope, with fx_store_four_words
  * Source   our own measurement; Arm v7-M ARM A7.7.50 (LDRD needs word alignment only)
  * Units    none
  * Range    every value and every address of two words

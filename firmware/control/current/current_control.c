@@ -88,8 +88,10 @@ static int32_t unlimited_voltage(int32_t sigma_q24, int32_t weighted_q30, int32_
  * voltage fits Q30. gains: of the turned error, of the error. */
 static void integrate(current_control_state_t *state, current_control_state_t s, fx_pair_t gains, fx_pair_t error)
 {
-    state->s_d_q30 = fx_sat_bits(fx_difference2_cross_acc(s.s_d_q30, error, gains), 31);
-    state->s_q_q30 = fx_sat_bits(fx_dot2_acc(s.s_q_q30, error, gains), 31);
+    int32_t s_d_q30 = fx_sat_bits(fx_difference2_cross_acc(s.s_d_q30, error, gains), 31);
+    int32_t s_q_q30 = fx_sat_bits(fx_dot2_acc(s.s_q_q30, error, gains), 31);
+    fx_both_loaded(&s_d_q30, &s_q_q30);
+    *state = (current_control_state_t){s_d_q30, s_q_q30};
 }
 
 /* 1/(v_ratio v_dc), Q25 (CC-15), at most 64. Q31/Q15 = Q16. */
