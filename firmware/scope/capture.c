@@ -102,7 +102,7 @@ static void count_triggered(capture_t *capture, uint32_t count)
     }
 }
 
-static void record(capture_t *capture, int16_t *memory, const capture_source_t *source)
+static FX_NOT_INLINED void record(capture_t *capture, int16_t *memory, const capture_source_t *source)
 {
     const bool armed = capture->state == CAPTURE_ARMED;
     const uint32_t readable = contiguous(capture, source->newest);

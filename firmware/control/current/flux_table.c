@@ -33,9 +33,8 @@ flux_point_t flux_table_step(const flux_table_config_t *config, dq_q15_t i)
 {
     const fx_cell_t cell = cell_of(config, i);
     const uint32_t ny = config->mesh.ny;
-    int32_t psi_f0 = fx_cell_interp_y(config->psi_f0, cell);
-    int32_t g = fx_cell_interp(config->g, ny, cell);
-    fx_both_loaded(&psi_f0, &g);
+    const int32_t psi_f0 = fx_cell_interp_y(config->psi_f0, cell);
+    const int32_t g = fx_cell_interp(config->g, ny, cell);
     const int32_t i_scale = config->i_scale;
     const int32_t psi_d = fx_mulhi_add(psi_f0, fx_cell_sum(config->l_d, ny, cell), i.d * i_scale);
     const int32_t psi_q = fx_mulhi(fx_cell_sum(config->l_q, ny, cell), i.q * i_scale);
