@@ -10,6 +10,7 @@
 
 #include "planted.h"
 #include "signal/crc32.h"
+#include "worst.h"
 
 #define ALLOWED_NM 10.0
 #define ALLOWED_MS 50
@@ -79,7 +80,7 @@ static double beyond(double torque_Nm, double permitted_Nm_)
 {
     const double low = fmin(permitted_Nm_, 0.0);
     const double high = fmax(permitted_Nm_, 0.0);
-    return fmax(fmax(torque_Nm - high, low - torque_Nm), 0.0);
+    return worse_of(0.0, worse_of(torque_Nm - high, low - torque_Nm));
 }
 
 static verdict_t try_error(int error, const point_t *at, bool watched)
@@ -107,8 +108,8 @@ static verdict_t try_error(int error, const point_t *at, bool watched)
             break;
         }
         const double now_Nm = beyond(vehicle.torque_Nm, permitted_Nm(at, ms));
-        verdict.beyond_Nm = fmax(verdict.beyond_Nm, now_Nm);
-        in_a_row = (now_Nm > ALLOWED_NM) ? in_a_row + 1 : 0;
+        verdict.beyond_Nm = worse_of(verdict.beyond_Nm, now_Nm);
+        in_a_row = (now_Nm <= ALLOWED_NM) ? 0 : in_a_row + 1;
         verdict.longest_ms = (in_a_row > verdict.longest_ms) ? in_a_row : verdict.longest_ms;
     }
     planted_begin(-1, &vehicle);
@@ -127,7 +128,7 @@ static verdict_t try_everywhere(int error, const char *name, bool watched, bool 
                    points[n].speed_rpm, points[n].torque_Nm, (int)points[n].then, one.beyond_Nm, one.longest_ms,
                    (unsigned)vehicle.ecu.drive.fast.faults);
         }
-        worst.beyond_Nm = fmax(worst.beyond_Nm, one.beyond_Nm);
+        worst.beyond_Nm = worse_of(worst.beyond_Nm, one.beyond_Nm);
         worst.longest_ms = (one.longest_ms > worst.longest_ms) ? one.longest_ms : worst.longest_ms;
     }
     return worst;

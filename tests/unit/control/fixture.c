@@ -6,6 +6,7 @@
 #include <stdio.h>
 
 #include "unity.h"
+#include "worst.h"
 
 /* Assumed data of an invented machine in a 350 V, 300 A, 10 kHz inverter. */
 enum { NX = 15, NY = 15, NT = 9, NPSI = 9, POLE_PAIRS = 3, L_SHIFT = 2 };
@@ -336,8 +337,7 @@ fixture_t fixture(void)
 
 void worst_note(worst_t *worst, double error, const char *format, ...)
 {
-    /* Written as a negation so that NaN counts as the largest error. */
-    if ((worst->where[0] == '\0') || !(fabs(error) <= worst->error)) {
+    if ((worst->where[0] == '\0') || is_worse(fabs(error), worst->error)) {
         va_list arguments;
         va_start(arguments, format);
         (void)vsnprintf(worst->where, sizeof worst->where, format, arguments);

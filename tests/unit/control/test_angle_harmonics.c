@@ -4,6 +4,7 @@
 
 #include "control/adapt/angle_harmonics.h"
 #include "unity.h"
+#include "worst.h"
 
 static const double turn = 4294967296.0; /* counts per turn */
 static const double two_pi = 6.283185307179586476925;
@@ -48,7 +49,7 @@ static double drive(double rpm, double rpm_per_s, int steps)
         const uint32_t read = counts(theta + sensor_error(theta));
         const uint32_t corrected = read + (uint32_t)table[read >> ANGLE_HARMONICS_SHIFT];
         if (k >= steps - 100) {
-            worst = fmax(worst, fabs((double)(int32_t)(corrected - counts(theta)) / degree));
+            worst = worse_of(worst, fabs((double)(int32_t)(corrected - counts(theta)) / degree));
         }
         angle_harmonics_step(&config, &state, corrected, table);
     }
@@ -111,7 +112,7 @@ static double deviation(void)
     const double right[4] = {-0.3 * cos(1.0), -0.3 * sin(1.0), -0.25 * sin(0.4), -0.25 * cos(0.4)};
     double worst = 0.0;
     for (int n = 0; n < 4; n++) {
-        worst = fmax(worst, fabs(state.c[n] / degree - right[n]));
+        worst = worse_of(worst, fabs(state.c[n] / degree - right[n]));
     }
     return worst;
 }
@@ -130,7 +131,7 @@ void test_acceleration_changes_the_coefficients_only_at_its_beginning(void)
     (void)drive(4000.0, 0.0, 5000);
     for (int k = 0; k < 150; k++) {
         (void)drive(4000.0 + 20.0 * k, 0.0, 1);
-        worst = (k > 30) ? fmax(worst, deviation()) : 0.0;
+        worst = (k > 30) ? worse_of(worst, deviation()) : 0.0;
     }
     TEST_ASSERT_TRUE(worst < 0.027);
 }

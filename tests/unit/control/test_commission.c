@@ -5,6 +5,7 @@
 
 #include "twin/twin_commission.h"
 #include "unity.h"
+#include "worst.h"
 
 #define ONE 1073741824.0
 #define R 0.0133
@@ -107,11 +108,11 @@ void test_the_result_differs_from_that_of_the_twin_by_the_rounding_of_the_fit_on
         }
         const twin_curve_t twin = twin_commission(i, u, c);
         TEST_ASSERT_TRUE(commission_fit(&data, &curve));
-        r = fmax(r, fabs(twin.r - curve.r / ONE));
-        level = fmax(level, fabs(twin.level - curve.level / ONE));
-        knee = fmax(knee, fabs(twin_knee(&twin) - commission_knee(&curve) / ONE));
+        r = worse_of(r, fabs(twin.r - curve.r / ONE));
+        level = worse_of(level, fabs(twin.level - curve.level / ONE));
+        knee = worse_of(knee, fabs(twin_knee(&twin) - commission_knee(&curve) / ONE));
         for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
-            v = fmax(v, fabs(twin.v[k] - curve.v[k] / ONE));
+            v = worse_of(v, fabs(twin.v[k] - curve.v[k] / ONE));
         }
     }
     TEST_ASSERT_DOUBLE_WITHIN(2.0 / ONE, 0.0, r);
@@ -199,7 +200,7 @@ static double fundamental_error(const leg_t *leg)
         const commission_curve_t curve = commissioned(leg, theta, &knee);
         for (double i = 0.018; i < 0.6; i *= 1.1) {
             const double remaining = fundamental(leg, &curve, knee, i) - (curve.r / ONE - R) * i;
-            worst = fmax(worst, fabs(remaining) / (4.0 / 3.1415926535897932 * LEVEL));
+            worst = worse_of(worst, fabs(remaining) / (4.0 / 3.1415926535897932 * LEVEL));
         }
     }
     return worst;
@@ -215,7 +216,7 @@ static double curve_error(const leg_t *leg)
         for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
             const double i = curve.knot[k] / ONE;
             const double remaining = leg_error(leg, i) - (curve.r / ONE - R) * i - curve.v[k] / ONE;
-            worst = fmax(worst, fabs(remaining) / LEVEL);
+            worst = worse_of(worst, fabs(remaining) / LEVEL);
         }
     }
     return worst;

@@ -4,6 +4,7 @@
 #include "control/current/flux_table.h"
 #include "fixture.h"
 #include "unity.h"
+#include "worst.h"
 
 static fixture_t f;
 
@@ -36,7 +37,7 @@ static void compare_with_twin(worst_t *value, worst_t *flux, dq_q15_t i)
     worst_note(value, x.l_qq - t.l_qq * l, "l_qq of %d %d", i.d, i.q);
     worst_note(value, y.psi_f0 - t.psi_f0 * psi, "psi_f0 of %d %d", i.d, i.q);
     /* The nodes of g are themselves rounded by up to 0.5. */
-    worst_note(value, fmax(fabs(y.g - 0.5 * (t.g_d + t.g_q) * g) - 0.5, 0.0), "g of %d %d", i.d, i.q);
+    worst_note(value, worse_of(0.0, fabs(y.g - 0.5 * (t.g_d + t.g_q) * g) - 0.5), "g of %d %d", i.d, i.q);
     worst_note(flux, y.psi_d - twin_clamp(t.psi_d * psi, -32768, 32767), "psi_d of %d %d", i.d, i.q);
     worst_note(flux, y.psi_q - twin_clamp(t.psi_q * psi, -32768, 32767), "psi_q of %d %d", i.d, i.q);
     TEST_ASSERT_EQUAL(t.clamped, flux_table_outside(&f.flux_table, i));

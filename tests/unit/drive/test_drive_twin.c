@@ -11,6 +11,7 @@
 #include "seam.h"
 #include "twin/twin_private.h"
 #include "unity.h"
+#include "worst.h"
 
 /* The whole drive and its double-precision twin get the same quantised samples of a machine that follows the references
  * of the twin with a first-order lag; every duty must agree. The integrators of current control and torque loop and the
@@ -72,8 +73,8 @@ static double period(machine_t *m, double rpm)
     m->i_d += 0.1 * (twin_get(twin, "id_ref_A") - m->i_d);
     m->i_q += 0.1 * (twin_get(twin, "iq_ref_A") - m->i_q);
     TEST_ASSERT_EQUAL(out[3] > 0.5, seam.gates);
-    return fmax(fabs(seam.duty.a - out[0] * 32768.0),
-                fmax(fabs(seam.duty.b - out[1] * 32768.0), fabs(seam.duty.c - out[2] * 32768.0)));
+    return worse_of(fabs(seam.duty.a - out[0] * 32768.0),
+                    worse_of(fabs(seam.duty.b - out[1] * 32768.0), fabs(seam.duty.c - out[2] * 32768.0)));
 }
 
 static void command(double torque_Nm)
@@ -98,8 +99,8 @@ static void drive_at(double rpm, double torque_Nm)
             command(-0.5 * torque_Nm);
         }
         const double difference = period(&m, rpm);
-        worst = fmax(worst, difference);
-        off += difference > 40.0; /* a short pulse rounded to the other limit differs by 655 LSB for one period */
+        worst = worse_of(worst, difference);
+        off += !(difference <= 40.0); /* a short pulse rounded to the other limit differs by 655 LSB for one period */
     }
     (void)snprintf(where, sizeof where, "%g rpm, %g N m: at most %.1f LSB, %d periods differ", rpm, torque_Nm, worst,
                    off);

@@ -5,6 +5,7 @@
 #include "drive/motor.h"
 #include "twin/twin_stages.h"
 #include "unity.h"
+#include "worst.h"
 
 /* The generated constants of a shipped machine: the fixed-point ones against those in SI, by the units that the headers
  * state, and both against the requirements of the stages. */
@@ -163,12 +164,12 @@ void test_the_flux_tables_agree_with_the_unquantised_ones(void)
             const flux_inductances_t x = flux_table_inductances(&motor.flux_table, (dq_q15_t){(q15_t)d, (q15_t)q});
             const twin_flux_t t = twin_flux_table(&motor_si, (twin_dq_t){q15(d) * i_b, q15(q) * i_b});
             const double tolerance = 1.7 + 1.2 * (1 << motor.flux_table.l_shift) * fmax(fabs(q15(d)), fabs(q15(q)));
-            value = fmax(value, fabs(x.l_d - t.l_d * l));
-            value = fmax(value, fabs(x.l_qq - t.l_qq * l));
-            value = fmax(value, fabs(y.g - 0.5 * (t.g_d + t.g_q) * z_b * 32768.0));
-            value = fmax(value, fabs(y.psi_f0 - t.psi_f0 / psi_b * 32768.0));
-            flux = fmax(flux, fabs(y.psi_d - t.psi_d / psi_b * 32768.0) / tolerance);
-            flux = fmax(flux, fabs(y.psi_q - t.psi_q / psi_b * 32768.0) / tolerance);
+            value = worse_of(value, fabs(x.l_d - t.l_d * l));
+            value = worse_of(value, fabs(x.l_qq - t.l_qq * l));
+            value = worse_of(value, fabs(y.g - 0.5 * (t.g_d + t.g_q) * z_b * 32768.0));
+            value = worse_of(value, fabs(y.psi_f0 - t.psi_f0 / psi_b * 32768.0));
+            flux = worse_of(flux, fabs(y.psi_d - t.psi_d / psi_b * 32768.0) / tolerance);
+            flux = worse_of(flux, fabs(y.psi_q - t.psi_q / psi_b * 32768.0) / tolerance);
         }
     }
     TEST_ASSERT_DOUBLE_WITHIN(1.3, 0.0, value);

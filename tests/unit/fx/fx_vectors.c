@@ -6,6 +6,7 @@
 #include <stdio.h>
 
 #include "unity.h"
+#include "worst.h"
 
 const int32_t corner[CORNERS] = {
     INT32_MIN,   INT32_MIN + 1,
@@ -80,7 +81,7 @@ void expect_equal(const char *what, int64_t a, int64_t b, int64_t got, int64_t w
 
 void worst_note(worst_t *worst, long double error, int64_t a, int64_t b)
 {
-    if (!(fabsl(error) <= worst->error)) {
+    if (is_worse(fabsl(error), worst->error)) {
         *worst = (worst_t){fabsl(error), a, b};
     }
 }

@@ -10,6 +10,7 @@
 #include "hal/s32k144/sampling.h"
 #include "hal/s32k144/sincos.h"
 #include "unity.h"
+#include "worst.h"
 
 #define PERIOD 11200U
 #define SAMPLED 345.0 /* ticks: three starts of 3, two conversions of 38 clocks of 4, a sample of 8 clocks */
@@ -86,7 +87,7 @@ void test_the_angle_is_that_of_atan2(void)
             const double at = n / 65536.0 * TURN_RAD;
             const sincos_t scaled = {(int32_t)lround(16384.0 * lengths[k] * sin(at)),
                                      (int32_t)lround(16384.0 * lengths[k] * cos(at))};
-            worst = fmax(worst, fabs(error_rad(sincos_angle(scaled), atan2(scaled.sine, scaled.cosine))));
+            worst = worse_of(worst, fabs(error_rad(sincos_angle(scaled), atan2(scaled.sine, scaled.cosine))));
         }
     }
     TEST_ASSERT_TRUE(worst < ERROR_RAD);
