@@ -135,7 +135,8 @@ static inline void window_box_write(window_box_t *box, const identify_window_t *
     box->generation = box->generation + 1U;
 }
 
-/* In place: the 1 kHz task copies it together with the sample and repeats both if a period came in between. */
+/* In place: the slot is written again two windows later. The snapshot copies it together with the sample and repeats
+ * both if a period came in between. */
 static inline const identify_window_t *window_box_at(const window_box_t *box)
 {
     return &box->slot[box->generation & 1U];

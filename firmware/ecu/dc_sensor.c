@@ -3,8 +3,9 @@
 #include "drive/step_mean.h"
 #include "ecu/ecu_private.h"
 
-/* Of the newest period and the last window, which ends in it or shortly before. Without the sums of a step the mean
- * voltage is that of the period. */
+/* Of the newest period and the last window, which ends in it or shortly before. Both are read in place: the fast ISR
+ * writes their slots again a window later at the earliest. Without the sums of a step the mean voltage is that of the
+ * period. */
 static dc_jump_in_t read_inputs(const drive_t *drive)
 {
     const sample_t *sample = sample_box_last(&drive->samples);

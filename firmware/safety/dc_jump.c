@@ -31,10 +31,10 @@ static q15_t half_kappa(const dc_jump_config_t *config, const dc_jump_in_t *in)
     const dq_q15_t e = {without_change(config, in->u.d, in->psi.d - in->psi_last.d),
                         without_change(config, in->u.q, in->psi.q - in->psi_last.q)};
     const q31_t squared = dot_q28(w, w);
-    if (squared <= 4 * fx_mul_q30(config->v_0, config->v_0)) { /* (4 v_0)^2 as Q28 */
+    if (squared >> 2 <= fx_mul_q30(config->v_0, config->v_0)) { /* (4 v_0)^2 is 4 v_0^2 in Q28: may not fit 32 bits */
         return 0;
     }
-    return (q15_t)(fx_max_s32(fx_div_q31(dot_q28(e, w) / 2, squared), 0) >> 16);
+    return (q15_t)fx_max_s32(fx_div_q31(dot_q28(e, w) / 2, squared) >> 16, 0);
 }
 
 static bool has_moved(const dc_jump_config_t *config, const dc_jump_state_t *state, const dc_jump_in_t *in)

@@ -11,7 +11,7 @@
  * Source   docs/theory/monitors.md (MN-45) ... (MN-48)
  * Units    per unit
  * Range    every argument; saturates
- * Rounding 2^-14 of kappa, against a threshold of 0.05
+ * Rounding 2^-14 of kappa, three times that of its mean, against a threshold of 0.05
  * Errors   returns true in the step in which the sensor is found; the caller raises the fault
  * Context  1 kHz task; one division */
 #include <stdbool.h>

@@ -234,6 +234,94 @@ void test_at_a_low_dc_voltage_the_machine_is_slow_below_what_could_charge_the_li
     TEST_ASSERT_TRUE(observe()->slow);
 }
 
+enum { PERIODS_IN_STEP = 10, V_0 = 425, QUARTER_OF_T_0 = 278 };
+
+/* A point at half of the speed base with current in both axes and a flux that changes. */
+static void compare_point(void)
+{
+    sample.acting = true;
+    sample.point = (operating_point_t){
+        .i = {-6000, 9000}, .u = {-4500, 7100}, .flux = {.psi_d = 14000, .psi_q = 9000}, .omega = 1 << 30};
+    ecu.drive.task.torque_monitor.psi = (dq_q15_t){13500, 9400};
+}
+
+static void check_dc_sensor(void)
+{
+    *sample_box_begin(&ecu.drive.samples) = sample;
+    sample_box_publish(&ecu.drive.samples);
+    ecu_check_dc_sensor(&ecu);
+}
+
+/* (MN-45) of compare_point(), halved, in Q15: R = 0.01333 and 1/(omega_b T) = 0.30315 of hsm1. */
+static int32_t half_kappa(double u_d, double u_q)
+{
+    const double w_d = 0.01333 * -6000.0 - 0.5 * 9200.0, w_q = 0.01333 * 9000.0 + 0.5 * 13750.0;
+    const double e_d = u_d - 0.30315 * 500.0, e_q = u_q + 0.30315 * 400.0;
+    return (int32_t)(16384.0 * (e_d * w_d + e_q * w_q) / (w_d * w_d + w_q * w_q));
+}
+
+/* Rounding of the voltages by 2 of 8300 counts makes 4 counts; the winding's drop alone makes 200. */
+void test_the_dc_voltage_sensor_is_compared_by_the_motor_data(void)
+{
+    compare_point();
+    check_dc_sensor();
+    TEST_ASSERT_INT_WITHIN(5, half_kappa(-4500.0, 7100.0), ecu.dc_jump.half_kappa);
+    TEST_ASSERT_EQUAL_INT(sample.v_dc, ecu.dc_jump.v_dc);
+    TEST_ASSERT_EQUAL_INT(16384, ecu.dc_jump.omega);
+}
+
+/* The paper's law leaves no sums of the present step; nor does a bridge that did not switch throughout it. */
+void test_the_dc_voltage_sensor_is_compared_by_the_steps_mean_voltage_if_there_is_one(void)
+{
+    const identify_window_t window = {.sum_u = {PERIODS_IN_STEP * -4000, PERIODS_IN_STEP * 6000}, .acting = true};
+    for (int n = 0; n < 3; n++) {
+        ecu.dc_jump = (dc_jump_state_t){0};
+        compare_point();
+        window_box_write(&ecu.drive.windows, (n == 2) ? &(identify_window_t){.sum_u = window.sum_u} : &window);
+        ecu.drive.request.identification_mode = (n == 1) ? IDENTIFICATION_PAPER : IDENTIFICATION_ROBUST;
+        check_dc_sensor();
+        TEST_ASSERT_INT_WITHIN(5, (n == 0) ? half_kappa(-4000.0, 6000.0) : half_kappa(-4500.0, 7100.0),
+                               ecu.dc_jump.half_kappa);
+    }
+}
+
+void test_the_dc_voltage_sensor_is_compared_only_while_the_bridge_follows_the_torque_path(void)
+{
+    for (int n = 0; n < 3; n++) {
+        compare_point();
+        sample.acting = n != 1;
+        ecu.drive.request.current_mode = n == 2;
+        check_dc_sensor();
+        TEST_ASSERT_EQUAL(n == 0, ecu.dc_jump.before != 0U);
+    }
+}
+
+/* Without current the rotational voltage is half of the flux. */
+void test_the_dc_voltage_sensor_is_compared_above_four_times_the_inverters_voltage_error(void)
+{
+    compare_point();
+    sample.point.i = (dq_q15_t){0, 0};
+    sample.point.flux.psi_q = 0;
+    for (int beyond = 0; beyond < 2; beyond++) {
+        sample.point.flux.psi_d = 8 * V_0 + 2 * beyond;
+        ecu.drive.task.torque_monitor.psi = (dq_q15_t){sample.point.flux.psi_d, 0};
+        check_dc_sensor();
+        TEST_ASSERT_EQUAL(beyond, ecu.dc_jump.before);
+    }
+}
+
+void test_the_dc_voltage_sensor_is_compared_while_the_commanded_torque_is_steady(void)
+{
+    static const uint8_t steady[] = {1, 2, 3, 1};
+    static const q15_t torque[] = {1000, 1000, 1000 + QUARTER_OF_T_0, 1001 + QUARTER_OF_T_0};
+    compare_point();
+    for (unsigned n = 0; n < sizeof steady; n++) {
+        ecu.drive.task.torque_commanded = torque[n];
+        check_dc_sensor();
+        TEST_ASSERT_EQUAL_UINT8(steady[n], ecu.dc_jump.before);
+    }
+}
+
 /* The sensor reads so many times the voltage, and the drive computes the acting voltage from it. */
 static void read_dc(double gain)
 {

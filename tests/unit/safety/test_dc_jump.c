@@ -2,11 +2,13 @@
 #include "safety/dc_jump.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 #include "unity.h"
 
 /* r = 0.0137, psi_f = 0.44, 10 N·m = 0.034, 7 V = 0.013: about those of hsm1. */
-static const dc_jump_config_t config = {.r = 898, .t_0 = 1112, .v_0 = 425, .rate_gain = 19867};
+static const dc_jump_config_t hsm1 = {.r = 898, .t_0 = 1112, .v_0 = 425, .rate_gain = 19867};
+static dc_jump_config_t config;
 static dc_jump_state_t state;
 static dc_jump_in_t in;
 
@@ -70,6 +72,7 @@ static void begin(double omega, double i_d, double i_q, double flux)
 
 void setUp(void)
 {
+    config = hsm1;
     begin(0.3, -0.2, 0.3, 1.0);
 }
 
@@ -225,6 +228,127 @@ void test_below_four_times_the_inverters_error_nothing_is_compared(void)
     TEST_ASSERT_EQUAL(FOUND, found_in(50));
 }
 
+static void expect_nothing_compared(void)
+{
+    static const dc_jump_state_t nothing;
+    TEST_ASSERT_EQUAL_MEMORY(&nothing, &state, sizeof nothing);
+}
+
+static int32_t random_in(int32_t low, int32_t high)
+{
+    return low + rand() % (high - low + 1);
+}
+
+static void draw(void)
+{
+    in.u = (dq_q15_t){random_in(-20000, 20000), random_in(-20000, 20000)};
+    in.i = (dq_q15_t){random_in(-20000, 20000), random_in(-20000, 20000)};
+    in.psi_last = (dq_q15_t){random_in(2000, 20000), random_in(-20000, 20000)};
+    in.psi = (dq_q15_t){in.psi_last.d + random_in(-1500, 1500), in.psi_last.q + random_in(-1500, 1500)};
+    in.omega = (q15_t)random_in(-32767, 32767);
+    in.torque = 10000; /* not that of a state that is empty */
+}
+
+/* (MN-45) by hand; 0 where it is not compared. */
+static double twin_kappa(double *w)
+{
+    const double r = 898.0 / 65536.0, rate = 19867.0 / 65536.0, omega = in.omega / 32768.0;
+    const double w_d = r * in.i.d - omega * (in.psi.q + in.psi_last.q) / 2.0;
+    const double w_q = r * in.i.q + omega * (in.psi.d + in.psi_last.d) / 2.0;
+    const double e_d = in.u.d - rate * (in.psi.d - in.psi_last.d), e_q = in.u.q - rate * (in.psi.q - in.psi_last.q);
+    *w = hypot(w_d, w_q);
+    return (*w > 4.0 * 425.0) ? (e_d * w_d + e_q * w_q) / (*w * *w) : 0.0;
+}
+
+/* A component of e is rounded by 1/2 count, one of w by 1.5 (two products, the mean of two fluxes): 0.8 and 2.2 together.
+ * An error of w changes kappa by at most its share of |w|, times 2 |kappa| + |e|/|w|. A flux changes by up to 1500 counts
+ * in each axis, its voltage by 643. */
+void test_kappa_is_the_share_of_the_rotational_voltage_in_any_direction(void)
+{
+    int compared = 0, opposed = 0;
+    srand(1);
+    for (int n = 0; n < 100000; n++) {
+        double w;
+        state = (dc_jump_state_t){0};
+        draw();
+        const double kappa = twin_kappa(&w), e = hypot(in.u.d, in.u.q) + 650.0;
+        const double tolerance = 1.0 + 16384.0 / w * (0.8 + 2.2 * (2.0 * fabs(kappa) + e / w));
+        (void)step();
+        if (fabs(w - 1700.0) > 3.0 && fabs(kappa) < 1.9) {
+            TEST_ASSERT_DOUBLE_WITHIN(tolerance, fmax(16384.0 * kappa, 0.0), state.half_kappa);
+            compared += state.half_kappa > 0;
+            opposed += kappa < 0.0;
+        }
+    }
+    TEST_ASSERT_TRUE(compared > 20000 && opposed > 20000);
+}
+
+/* Half of it is a Q15 number. */
+void test_kappa_is_limited_to_two(void)
+{
+    jump(2.5, 1.0);
+    (void)step();
+    TEST_ASSERT_EQUAL(INT16_MAX, state.half_kappa);
+}
+
+/* A rotational voltage of 8192 and as much computed: kappa is 1, half of it 16384 exactly. */
+static void begin_exactly(int32_t u_q)
+{
+    state = (dc_jump_state_t){0};
+    in = (dc_jump_in_t){
+        .acting = true, .u = {0, u_q}, .psi = {16384, 0}, .psi_last = {16384, 0}, .omega = 16384, .v_dc = 16000};
+}
+
+void test_kappa_before_the_jump_is_a_mean_of_four_steps(void)
+{
+    static const int means[] = {16384, 17408, 18176, 18752, 19184, 19508};
+    begin_exactly(8192);
+    drive(1);
+    in.u.q = 10240; /* 20480 */
+    for (unsigned n = 1; n < sizeof means / sizeof means[0]; n++) {
+        drive(1);
+        TEST_ASSERT_EQUAL_INT(means[n], state.half_kappa);
+    }
+}
+
+/* A jump of a quarter: exactly half and exactly one and a half of it, 1024 and 3072 counts, are not the sensor's. */
+void test_exactly_half_and_one_and_a_half_of_the_jump_are_not_of_the_sensor(void)
+{
+    static const struct {
+        int32_t change;
+        int found;
+    } cases[] = {{1024, NEVER}, {1025, FOUND}, {3071, FOUND}, {3072, NEVER}};
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        begin_exactly(8192);
+        drive(10);
+        in.v_dc = 20000;
+        in.u.q = 8192 + cases[n].change;
+        TEST_ASSERT_EQUAL(cases[n].found, found_in(20));
+    }
+}
+
+/* v_0 = 400 counts, and a rotational voltage of 1600 or 1601. */
+void test_a_rotational_voltage_of_exactly_four_times_the_inverters_error_is_not_compared(void)
+{
+    config.v_0 = 400;
+    begin_exactly(1600);
+    in.psi.d = in.psi_last.d = 3200;
+    drive(1);
+    expect_nothing_compared();
+    in.psi.d = in.psi_last.d = 3202;
+    drive(1);
+    TEST_ASSERT_EQUAL_INT(1, state.before);
+}
+
+/* So a rig without a machine disables the comparison: (4 v_0)^2 is larger than any voltage, and than 32 bits of Q28. */
+void test_with_the_largest_error_of_the_inverter_nothing_is_compared(void)
+{
+    config.v_0 = INT16_MAX;
+    drive(20);
+    jump(1.2, 1.2);
+    TEST_ASSERT_EQUAL(NEVER, found_in(50));
+}
+
 void test_a_bridge_that_does_not_act_ends_the_comparison(void)
 {
     drive(20);
@@ -232,6 +356,7 @@ void test_a_bridge_that_does_not_act_ends_the_comparison(void)
     drive(FOUND - 1);
     in.acting = false;
     drive(1);
+    expect_nothing_compared();
     in.acting = true;
     drive(50);
 }
@@ -252,6 +377,7 @@ void test_a_voltage_against_the_rotational_one_is_not_compared(void)
 {
     jump(-1.0, 1.0);
     drive(20);
+    expect_nothing_compared();
     jump(1.2, 1.2);
     TEST_ASSERT_EQUAL(NEVER, found_in(50));
 }
