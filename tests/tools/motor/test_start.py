@@ -35,5 +35,21 @@ def test_without_a_speed_one_is_assumed(tmp_path: Path) -> None:
 
 def test_what_cannot_be_built_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["motor", "start", *UNKNOWN, "--full-scale", "100", "--out", str(tmp_path / "m")]) == 2
-    assert "full_scale" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert said.startswith("error: nameplate: inverter.current_full_scale_A = 100 A, allowed: from ")
+    assert str(tmp_path) not in said, "a folder that is gone"
     assert list(tmp_path.iterdir()) == []
+
+
+def test_guesses_replace_guesses_but_no_other_motor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "m" / "motor.toml"
+    assert run(["motor", "start", *UNKNOWN, "--out", str(tmp_path / "m")]) == 0
+    first = path.read_text(encoding="utf-8")
+    assert run(["motor", "start", *UNKNOWN[:-2], "--out", str(tmp_path / "m")]) == 0
+    assert path.read_text(encoding="utf-8") != first
+    measured = (ROOT / "firmware" / "motors" / "hsm1" / "motor.toml").read_text(encoding="utf-8")
+    path.write_text(measured, encoding="utf-8")
+    capsys.readouterr()
+    assert run(["motor", "start", *UNKNOWN, "--out", str(tmp_path / "m")]) == 2
+    assert "allowed: another folder" in capsys.readouterr().err
+    assert path.read_text(encoding="utf-8") == measured

@@ -14,8 +14,10 @@ from pathlib import Path
 import click
 
 from fluxtrue_tools import kinds, paths
+from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.names import FILE_NAME
 
+ORIGIN = "# Nameplate of a motor, by `fluxtrue motor start`"
 BASE_SPEED_SHARE = 1.0 / 3.0  # of the maximum speed
 SAFE_SHARE = 0.1  # of the guessed inductance
 DROP_SHARE = 0.01  # of the phase voltage across the resistance at i_max
@@ -45,7 +47,7 @@ def guess(
 def text(name: str, i_max_A: float, vdc_V: float, pwm_hz: float, pole_pairs: int, full_scale_A: float,
          guessed: dict[str, float]) -> str:  # fmt: skip
     """motor.toml."""
-    lines = ["# Nameplate of a motor, by `fluxtrue motor start`; `fluxtrue commission` replaces what is guessed.",
+    lines = [f"{ORIGIN}; `fluxtrue commission` replaces what is guessed.",
              "", "[machine]", f'name = "{name}"', f"pole_pairs = {pole_pairs}", f"i_max_A = {i_max_A:g}",
              "r_temp_coeff_per_K = 0.00393   # copper"]  # fmt: skip
     notes = {"ld_H": "   # a tenth of the guess: gains for any inductance from here on", "lq_H": "   # the same"}
@@ -54,6 +56,23 @@ def text(name: str, i_max_A: float, vdc_V: float, pwm_hz: float, pole_pairs: int
               f"dead_time_s = {min(2e-6, 0.02 / pwm_hz)!r}   # assumed", f"current_full_scale_A = {full_scale_A:g}",
               "adc_bits = 12   # assumed", ""]  # fmt: skip
     return "\n".join(lines)
+
+
+def _check_free(out: Path) -> None:
+    """Guesses replace guesses only: never the data of a motor that was measured or written by hand."""
+    path = out / FILE_NAME
+    if path.is_file() and ORIGIN not in path.read_text(encoding="utf-8", errors="replace"):
+        raise FluxtrueError(f"--out {out}: has a {FILE_NAME} that is not of motor start, allowed: another folder")
+
+
+def _check(staging: Path) -> None:
+    """What motor build would refuse is refused here."""
+    from fluxtrue_tools.motor.motor import load_motor
+
+    try:
+        load_motor(staging)
+    except FluxtrueError as error:  # its file is in a folder that the user never sees
+        raise FluxtrueError(str(error).replace(f"{staging / FILE_NAME}: ", "nameplate: ")) from None
 
 
 @click.command("start", cls=paths.Command)
@@ -70,14 +89,14 @@ def start(out: Path, i_max: float, vdc: float, pwm: float, pole_pairs: int, spee
           full_scale: float | None) -> None:  # fmt: skip
     """Make a motor folder from a nameplate, for `fluxtrue commission`."""
     from fluxtrue_tools.motor.map_import.folder import name_from
-    from fluxtrue_tools.motor.motor import load_motor
 
+    _check_free(out)
     guessed = guess(i_max, vdc, 1e3 * pwm, pole_pairs, speed_max)
     with paths.outputs() as outputs:
         staging = outputs.scratch(out)
         wanted = text(name_from(out), i_max, vdc, 1e3 * pwm, pole_pairs, full_scale or FULL_SCALE_PER_I_MAX * i_max,
                       guessed)  # fmt: skip
         (staging / FILE_NAME).write_text(wanted, encoding="utf-8")
-        load_motor(staging)  # what motor build would refuse is refused here
+        _check(staging)
     click.echo(f"nameplate written to {out}; guessed: "
                + ", ".join(f"{key} = {value:g}" for key, value in guessed.items()))  # fmt: skip
