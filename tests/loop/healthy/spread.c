@@ -56,8 +56,6 @@ static void draw_sensors(vehicle_t *vehicle, dice_t *dice)
     }
     vehicle_set(vehicle, "plant.current_noise_A_rms", 0.002 * full_scale_A);
     vehicle_set(vehicle, "plant.adc_bits", 12.0);
-    vehicle_set(vehicle, "plant.current_quantise", 1.0);
-    vehicle_set(vehicle, "plant.vdc_quantise", 1.0);
     draw(vehicle, dice, "plant.vdc_gain", 0.995, 1.005);
     vehicle_set(vehicle, "plant.angle_bits", 12.0);
     draw(vehicle, dice, "plant.angle_offset_rad", -0.5 * DEGREE, 0.5 * DEGREE);

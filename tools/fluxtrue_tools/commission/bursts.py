@@ -232,6 +232,12 @@ def _sum(means: Array, period_s: float) -> Array:
     return period_s * np.concatenate(([0.0], np.cumsum(means)))
 
 
+def level_linkage(raw: Raw, knee_A: float) -> Array:
+    """What the legs' voltage adds to the flux linkage for each volt that is not compensated, in the rotor frame."""
+    i_s = raw.i * np.exp(1j * raw.theta)
+    return np.asarray(-_sum(of_legs(i_s, knee_A), raw.period_s) * np.exp(-1j * raw.theta))
+
+
 def integrate(raw: Raw, r_ohm: float, knee_A: float = 0.0) -> Linkage:
     """(CM-11): in the stationary frame, so that a movement of the rotor is part of the model."""
     turn = np.exp(1j * raw.theta)
@@ -240,5 +246,5 @@ def integrate(raw: Raw, r_ohm: float, knee_A: float = 0.0) -> Linkage:
     volts = _sum(raw.u[:-1] * middle, raw.period_s)
     r_part = _sum(0.5 * (i_s[1:] + i_s[:-1]), raw.period_s)
     back = np.exp(-1j * raw.theta)
-    level_part = _sum(of_legs(i_s, knee_A), raw.period_s)
-    return Linkage(raw.i, (volts - r_ohm * r_part) * back, back * turn[0], -r_part * back, -level_part * back, raw.axes)
+    of_level = level_linkage(raw, knee_A)
+    return Linkage(raw.i, (volts - r_ohm * r_part) * back, back * turn[0], -r_part * back, of_level, raw.axes)

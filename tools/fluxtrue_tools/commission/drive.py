@@ -100,7 +100,11 @@ class SoftwareInTheLoop:
 
     def capture(self, names: Sequence[str], periods: int) -> Array:
         """Every period, by reading the names after it."""
-        self._loop.record([self._allowed(name) for name in names])
+        return self._recorded([self._allowed(name) for name in names], periods)
+
+    def _recorded(self, names: Sequence[str], periods: int) -> Array:
+        """Also of names that a commissioning cannot read."""
+        self._loop.record(list(names))
         rows = self._loop.run(periods)
         self.passed(periods * self.period_s)
         return rows

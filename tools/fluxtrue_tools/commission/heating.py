@@ -36,11 +36,9 @@ class Metered(SoftwareInTheLoop):
 
     def capture(self, names: Sequence[str], periods: int) -> Array:
         """As SoftwareInTheLoop.capture()."""
-        self._loop.record([self._allowed(name) for name in names] + list(TRUTH))
-        rows = self._loop.run(periods)
+        rows = self._recorded([*map(self._allowed, names), *TRUTH], periods)
         self.seconds += periods * self.period_s
         self.square_A2s += float(np.square(rows[:, -2:]).sum()) * self.period_s
-        self.passed(periods * self.period_s)
         return rows[:, :-2]
 
 

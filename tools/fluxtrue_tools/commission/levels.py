@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from fluxtrue_tools.commission.bursts import FAILURES, Burst, Linkage, Raw, integrate, record
+from fluxtrue_tools.commission.bursts import FAILURES, Burst, Linkage, Raw, integrate, level_linkage, record
 from fluxtrue_tools.commission.drive import Capture
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.noise import Noise, of_phases
@@ -122,7 +122,7 @@ class _Equations:
 
     def rows(self, knee_A: float) -> Array:
         """A column for each common unknown."""
-        of_level = self._all(lambda level: -integrate(level.raw, 0.0, knee_A).of_level.real)
+        of_level = self._all(lambda level: -level_linkage(level.raw, knee_A).real)
         return np.column_stack((self._of_r, of_level, self._seconds))
 
     def solve(self, rows: Array) -> tuple[Array, float]:

@@ -24,8 +24,8 @@ REQUEST: Final = "bus.command.TorqueRequested"
 REQUEST_LATER: Final = "request"  # in a line's setup: what is requested until the injection
 CHANNELS: Final = ("truth.torque_shaft_mean_Nm", "truth.i_d_A", "truth.i_q_A", "truth.vdc_V", "fault_word",
                    "truth.theta_m_rad")  # fmt: skip
-# Lost below this size of the current to quantisation alone, as in the shipped scenarios: 0.5 A of noise, 12-bit angle.
-SENSORS: Final = {"current_noise_A_rms": 0.5, "angle_bits": 12.0, "vdc_quantise": 1.0}
+# As in the shipped scenarios: 0.5 A of noise, 12-bit angle. The firmware always gets whole codes of the converters.
+SENSORS: Final = {"current_noise_A_rms": 0.5, "angle_bits": 12.0}
 
 
 @dataclass(frozen=True)

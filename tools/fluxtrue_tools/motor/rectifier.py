@@ -33,7 +33,8 @@ def _orthogonal_iq_A(model: FluxModel, i_d: Array, top_A: float) -> Array:
 
 
 def largest_flux_share(model: FluxModel) -> float:
-    """kappa, the largest flux of a machine that generates into diodes, over that of its magnets alone."""
+    """kappa, the largest flux of a machine that generates into diodes, over that of its magnets alone, which is not 0:
+    a machine without magnets is refused when its data are read."""
     psi_f = float(model.psi_d(0.0, 0.0))
     step_A = psi_f / float(model.psi_d(0.0, 0.0, nd=1))
     end_A = _cancelling_id_A(model, step_A)
