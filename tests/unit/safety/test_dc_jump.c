@@ -260,9 +260,9 @@ static double twin_kappa(double *w)
     return (*w > 4.0 * 425.0) ? (e_d * w_d + e_q * w_q) / (*w * *w) : 0.0;
 }
 
-/* A component of e is rounded by 1/2 count, one of w by 1.5 (two products, the mean of two fluxes): 0.8 and 2.2 together.
- * An error of w changes kappa by at most its share of |w|, times 2 |kappa| + |e|/|w|. A flux changes by up to 1500 counts
- * in each axis, its voltage by 643. */
+/* A component of e is rounded by 1/2 count, one of w by 1.5 (two products, a mean of two fluxes): 0.8 and 2.2 together.
+ * An error of w changes kappa by at most its share of |w|, times 2 |kappa| + |e|/|w|. A flux changes by up to 1500
+ * counts in each axis, its voltage by 643. */
 void test_kappa_is_the_share_of_the_rotational_voltage_in_any_direction(void)
 {
     int compared = 0, opposed = 0;
