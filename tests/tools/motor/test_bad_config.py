@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """motor.toml: every error is reported in one line, and nothing is written."""
 
+import os
 from pathlib import Path
 
 import pytest
 from conftest import toml
 
+from fluxtrue_tools.cli import run
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.config import load_config
 from fluxtrue_tools.motor.motor import load_motor
@@ -152,6 +154,15 @@ def test_the_command_line_says_it_in_one_line_and_writes_nothing(cli, write, tmp
     assert result.stderr.count("\n") == 1 and result.stderr.startswith("error: ")
     assert str(Path(bad, "motor.toml")) in result.stderr
     assert not out.exists()
+
+
+def test_a_pipe_in_place_of_the_file_is_refused_without_being_read(tmp_path, capsys):
+    """Reading it would wait until something is written to it."""
+    os.mkfifo(tmp_path / "motor.toml")
+    for command in (["check"], ["build", "--no-report", "--out", str(tmp_path / "out")]):
+        assert run(["motor", command[0], str(tmp_path), *command[1:]]) == 2
+        assert capsys.readouterr().err == f"error: {tmp_path}/motor.toml: cannot be read (not a file)\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["motor.toml"]
 
 
 def test_the_example_in_the_guide_is_a_valid_motor(folder):

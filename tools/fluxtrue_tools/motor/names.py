@@ -17,6 +17,8 @@ def source_files(folder: Path) -> tuple[Path, ...]:
     """What a motor is made from: nothing that is written may take its place."""
     path = folder / FILE_NAME
     try:
+        if not path.is_file():  # reading a pipe would wait, and a device may have no end
+            return (path,)
         return path, folder / tomllib.loads(path.read_text(encoding="utf-8-sig"))["machine"]["flux_map"]
     except (OSError, ValueError, TypeError, LookupError, RecursionError):
         return (path,)  # a missing or unreadable map is reported when it is loaded
