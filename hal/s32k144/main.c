@@ -18,6 +18,7 @@
 #include "hal/s32k144/registers.h"
 #include "hal/s32k144/sampling.h"
 #include "hal/s32k144/startup.h"
+#include "hal/s32k144/temperature.h"
 #include "hal/s32k144/tick.h"
 #include "hal/watchdog.h"
 #include "storage/memory.h"
@@ -109,6 +110,7 @@ void tick_handler(void)
 {
     tick_cleared();
     sampling_tick();
+    temperature_tick();
     alarms.angle_relative = !hal_angle_is_absolute();
 #if DIRECT
     hal_watchdog_service();

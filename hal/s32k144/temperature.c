@@ -1,18 +1,38 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "hal/temperature.h"
+#include "hal/s32k144/temperature.h"
 
 #include "hal/s32k144/die.h"
 #include "hal/s32k144/ntc.h"
 #include "hal/s32k144/sampling.h"
+#include "hal/temperature.h"
+
+#define CYCLE_STEPS 8U
+
+static uint32_t steps;
+static int16_t winding_dC, inverter_dC;
+
+/* The first step needs both. Before the converters run, and with a broken sensor, there is no temperature: each step
+ * tries again, which takes no division. */
+void temperature_tick(void)
+{
+    const uint32_t turn = steps % CYCLE_STEPS;
+    if (turn == 0U || !temperature_is_known(winding_dC)) {
+        winding_dC = ntc_dC(sampling_winding());
+    }
+    if (turn == CYCLE_STEPS / 2U || steps == 0U || !temperature_is_known(inverter_dC)) {
+        inverter_dC = ntc_dC(sampling_inverter());
+    }
+    steps++;
+}
 
 int16_t hal_temperature_winding_dC(void)
 {
-    return ntc_dC(sampling_winding());
+    return winding_dC;
 }
 
 int16_t hal_temperature_inverter_dC(void)
 {
-    return ntc_dC(sampling_inverter());
+    return inverter_dC;
 }
 
 int16_t hal_temperature_processor_dC(void)
