@@ -92,7 +92,7 @@ static void begin_step(ecu_t *ecu)
     const shut_off_in_t in = {
         .fitted = hal_shut_off_question(&ecu->question),
         .supply = hal_shut_off_supply(),
-        .switching = hal_pwm_gates(),
+        .switching = !ecu->shut_off.tested && hal_pwm_gates(), /* only the test compares it */
         .wanted = on->gate_driver,
         .idle = !on->contactor && !on->precharge,
         .elapsed_us = ecu->clock.elapsed_us,
