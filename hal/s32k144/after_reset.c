@@ -13,9 +13,9 @@
 #define TWO_PI 6.2831853F
 #define KEPT_LINES ((1U << PIN_MAIN_CONTACTOR) | (1U << PIN_GATE_DRIVER))
 
-/* Start-up only, but for after_reset_note(). */
-static retained_t retained;
-static q15_t speed; /* measured, negative: not known */
+static retained_t retained; /* start-up: what the last run left; then: what this one has written last */
+static uint32_t steps;
+static q15_t speed; /* measured, negative: not known; start-up only */
 
 static q15_t measured_speed(void)
 {
@@ -66,5 +66,9 @@ void after_reset_note(const drive_t *drive)
 {
     retained_t now = {.lines = PTC->PDIR & KEPT_LINES};
     before_reset(drive, &now.drive);
-    retained_write(&now);
+    steps++;
+    if (retained_is_due(&now, &retained, steps)) {
+        retained = now;
+        retained_write(&now);
+    }
 }

@@ -7,6 +7,7 @@
 #include "hal/s32k144/can_mailbox.h"
 #include "hal/s32k144/die.h"
 #include "hal/s32k144/ntc.h"
+#include "hal/s32k144/retained.h"
 #include "hal/temperature.h"
 #include "unity.h"
 
@@ -107,4 +108,25 @@ void test_the_sensor_on_the_die_follows_its_line_and_is_unknown_outside_the_rang
     TEST_ASSERT_EQUAL_INT16(TEMPERATURE_UNKNOWN, die_dC(704));
     TEST_ASSERT_EQUAL_INT16(TEMPERATURE_UNKNOWN, die_dC(0));
     TEST_ASSERT_EQUAL_INT16(TEMPERATURE_UNKNOWN, die_dC(4095));
+}
+
+void test_what_outlasts_a_reset_is_written_in_every_fourth_step_and_at_once_when_a_flag_changes(void)
+{
+    const retained_t last = {.drive = {.speed = 100, .armed = true, .speed_valid = true}, .lines = 3};
+    retained_t now = last;
+    now.drive.speed = 200;
+    int written = 0;
+    for (uint32_t step = 1; step <= 40; step++) {
+        written += retained_is_due(&now, &last, step) ? 1 : 0;
+    }
+    TEST_ASSERT_EQUAL_INT(10, written);
+    TEST_ASSERT_FALSE(retained_is_due(&now, &last, 1));
+    now.lines = 1;
+    TEST_ASSERT_TRUE(retained_is_due(&now, &last, 1));
+    now = last;
+    now.drive.armed = false;
+    TEST_ASSERT_TRUE(retained_is_due(&now, &last, 1));
+    now = last;
+    now.drive.speed_valid = false;
+    TEST_ASSERT_TRUE(retained_is_due(&now, &last, 1));
 }
