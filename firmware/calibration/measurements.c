@@ -7,9 +7,12 @@
 
 #define MEASURED(drive) ((drive)->samples.slot[(drive)->samples.generation % SAMPLE_SLOTS])
 
-#define FILL(name, type, base, expression, text) .name = (MEASUREMENT_TYPE_##type)(expression),
+#define WRITE(name, type, base, expression, text) measurements->name = (MEASUREMENT_TYPE_##type)(expression);
 
-void measurements_step(measurements_t *measurements, const drive_t *d)
+void measurements_step(measurements_t *measurements, const drive_t *d, bool recorded)
 {
-    *measurements = (measurements_t){MEASUREMENT_LIST(FILL)};
+    MEASUREMENT_KEPT_LIST(WRITE)
+    if (recorded) {
+        MEASUREMENT_RECORDED_LIST(WRITE)
+    }
 }

@@ -6,6 +6,7 @@
  * Units    per unit of motor.bases or SI, as the list says
  * Errors   none
  * Context  1 kHz task; floating point, hence in no interrupt above it */
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "calibration/measurement_list.h"
@@ -21,6 +22,7 @@ typedef struct {
     MEASUREMENT_LIST(MEASUREMENT_FIELD)
 } measurements_t;
 
-void measurements_step(measurements_t *measurements, const drive_t *d);
+/** recorded: a tool may read the values. Otherwise only those that the freeze frame keeps are written. */
+void measurements_step(measurements_t *measurements, const drive_t *d, bool recorded);
 
 #endif

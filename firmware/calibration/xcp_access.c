@@ -104,9 +104,9 @@ void xcp_access_step(xcp_access_t *access, drive_t *drive, uint32_t passed_ms)
     if (access->applied != access->xcp.generation) {
         apply(access, drive);
     }
-    measurements_step(&access->measurements, drive);
-    const xcp_config_t config = protocol_config(access);
-    xcp_daq_event(&access->xcp.daq, &config.memory, passed_ms);
+    measurements_step(&access->measurements, drive, access->xcp.connected);
+    const xcp_memory_t memory = {access->area, XCP_ACCESS_AREAS};
+    xcp_daq_event(&access->xcp.daq, &memory, passed_ms);
 }
 
 bool xcp_access_next(const xcp_access_t *access, can_frame_t *frame)

@@ -20,8 +20,8 @@ typedef struct {
 
 #define RETAINED_STEPS 4U /* speed, dc voltage and flux hardly change meanwhile */
 
-/** Whether `now` must be written in this step: in every fourth one, and at once when a line, the permission of the short
- * circuit or the validity of the speed, which decide by themselves, differs from what was written last. */
+/** Whether `now` must be written in this step: in every fourth one, and at once when a line, the permission of the
+ * short circuit or the validity of the speed, which decide by themselves, differs from what was written last. */
 static inline bool retained_is_due(const retained_t *now, const retained_t *last, uint32_t step)
 {
     return step % RETAINED_STEPS == 0U || now->lines != last->lines || now->drive.armed != last->drive.armed ||

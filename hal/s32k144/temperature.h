@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_S32K144_TEMPERATURE_H
 #define HAL_S32K144_TEMPERATURE_H
-/** Temperatures of winding and inverter, converted in turn: each once in 8 steps, four steps apart. A thermistor follows
- * heat sink in seconds, and a fault needs 110 steps (MN-5): with a conversion in each step neither would be different.
- * Source   README.md, analogue inputs
+/** Temperatures of winding and inverter, converted in turn: each once in 8 steps, four steps apart. A thermistor
+ * follows its heat sink in seconds, and a fault needs 110 steps (MN-5): more conversions would tell no more.
+ * Source   README.md, temperatures
  * Units    steps of the 1 kHz task
  * Range    hal/temperature.h
  * Errors   a broken sensor is reported up to 8 steps later, by the values of hal/temperature.h

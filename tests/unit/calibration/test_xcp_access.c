@@ -293,6 +293,19 @@ void test_a_measurement_list_is_sampled_in_each_step_and_its_frames_are_sent_onc
     TEST_ASSERT_FALSE(xcp_access_next(&access, &frame));
 }
 
+/* The freeze frame needs its signals whether a tool is connected or not. */
+void test_without_a_tool_only_the_signals_of_the_freeze_frame_are_measured(void)
+{
+    drive.task.torque_commanded = 11;
+    drive.task.torque_corrected = 12;
+    step();
+    TEST_ASSERT_EQUAL_INT(11, access.measurements.torque_commanded_Nm);
+    TEST_ASSERT_NOT_EQUAL_INT(12, access.measurements.torque_corrected_Nm);
+    connect();
+    step();
+    TEST_ASSERT_EQUAL_INT(12, access.measurements.torque_corrected_Nm);
+}
+
 void test_a_setting_beyond_the_scope_s_range_and_an_arming_twice_have_the_protocol_s_errors(void)
 {
     connect();
