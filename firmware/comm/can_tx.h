@@ -30,6 +30,10 @@ bool can_tx_due(can_tx_t *tx);
 /** Whether this step may send these messages; otherwise what only they contain need not be collected. */
 bool can_tx_may_send_temperatures(const can_tx_t *tx);
 bool can_tx_may_send_identification(const can_tx_t *tx);
+bool can_tx_may_send_status(const can_tx_t *tx);
+bool can_tx_may_send_limits(const can_tx_t *tx);
+bool can_tx_may_send_voltage_or_currents(const can_tx_t *tx);
+bool can_tx_may_send_diagnostics(const can_tx_t *tx);
 tx_result_t can_tx_next(can_tx_t *tx, const telemetry_t *telemetry, can_frame_t *frame);
 
 #endif

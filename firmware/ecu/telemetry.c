@@ -20,15 +20,14 @@ static void read_point(const drive_t *drive, const sample_t *sample, telemetry_t
     t->iq_ref_A = si_from_q15(wanted.q, b->current_A);
     t->v_dc_V = si_from_q15(sample->v_dc, b->voltage_V);
     t->i_dc_A = (t->v_dc_V > V_DC_MIN_V) ? 1.5F * (u_d * t->id_A + u_q * t->iq_A) / t->v_dc_V : 0.0F;
-    t->speed_rpm = drive_speed_rpm(drive, sample->point.omega);
 }
 
-static void read_torque(const drive_t *drive, telemetry_t *t)
+static void read_status(const drive_t *drive, const sample_t *sample, telemetry_t *t)
 {
     const float base = drive->motor->bases.torque_Nm;
     t->torque_estimated_Nm = si_from_q15(drive->task.identification.torque_estimated, base);
     t->torque_commanded_Nm = si_from_q15(drive->task.torque_commanded, base);
-    t->torque_max_Nm = si_from_q15(drive->task.reference.torque_max, base);
+    t->speed_rpm = drive_speed_rpm(drive, sample->point.omega);
 }
 
 static void read_identification(const drive_t *drive, telemetry_t *t)
@@ -56,8 +55,15 @@ void telemetry_read(const drive_t *drive, const can_tx_t *tx, telemetry_t *telem
 {
     const sample_t *sample = sample_box_last(&drive->samples);
     telemetry->scales = &drive->motor->bus_scales;
-    read_point(drive, sample, telemetry);
-    read_torque(drive, telemetry);
+    if (can_tx_may_send_voltage_or_currents(tx)) {
+        read_point(drive, sample, telemetry);
+    }
+    if (can_tx_may_send_status(tx)) {
+        read_status(drive, sample, telemetry);
+    }
+    if (can_tx_may_send_limits(tx)) {
+        telemetry->torque_max_Nm = si_from_q15(drive->task.reference.torque_max, drive->motor->bases.torque_Nm);
+    }
     if (can_tx_may_send_identification(tx)) {
         read_identification(drive, telemetry);
     }

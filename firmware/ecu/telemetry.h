@@ -11,8 +11,7 @@
 #include "comm/can_tx.h"
 #include "drive/drive.h"
 
-/** Fields that only the messages of identification and temperatures contain are left as they are unless tx may send
- * these messages. */
+/** Physical values are left as they are unless tx may send a message that contains them. */
 void telemetry_read(const drive_t *drive, const can_tx_t *tx, telemetry_t *telemetry);
 
 #endif

@@ -145,11 +145,20 @@ void test_faults_overruns_and_the_name_of_the_motor_are_reported(void)
 }
 
 /* The values that no pending message contains stay as they were. */
-void test_identification_and_temperatures_are_read_only_for_their_messages(void)
+void test_physical_values_are_read_only_for_their_messages(void)
 {
     const can_tx_t none = {0};
-    telemetry = (telemetry_t){.psi_f_mVs = -1.0F, .winding_C = -1.0F};
+    telemetry = (telemetry_t){.psi_f_mVs = -1.0F,
+                              .winding_C = -1.0F,
+                              .speed_rpm = -1.0F,
+                              .torque_max_Nm = -1.0F,
+                              .v_dc_V = -1.0F,
+                              .torque_estimated_Nm = -1.0F};
     telemetry_read(&drive, &none, &telemetry);
     TEST_ASSERT_EQUAL_FLOAT(-1.0F, telemetry.psi_f_mVs);
     TEST_ASSERT_EQUAL_FLOAT(-1.0F, telemetry.winding_C);
+    TEST_ASSERT_EQUAL_FLOAT(-1.0F, telemetry.speed_rpm);
+    TEST_ASSERT_EQUAL_FLOAT(-1.0F, telemetry.torque_max_Nm);
+    TEST_ASSERT_EQUAL_FLOAT(-1.0F, telemetry.v_dc_V);
+    TEST_ASSERT_EQUAL_FLOAT(-1.0F, telemetry.torque_estimated_Nm);
 }
