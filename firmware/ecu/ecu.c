@@ -56,15 +56,17 @@ void ecu_continue(ecu_t *ecu)
 static void receive(ecu_t *ecu)
 {
     can_frame_t frame;
+    bool taken = false;
     for (int n = 0; n < FRAMES_PER_TASK && hal_can_receive(&frame); n++) {
         if (frame.id == XCP_ID_COMMAND && !frame.extended) {
             xcp_access_receive(&ecu->xcp, &ecu->drive, &ecu->scope, &frame);
         } else {
             second_level_frame(&ecu->second_level.frames, &frame);
-            (void)can_rx_frame(&ecu->rx, &ecu->drive.motor->bus_scales, &frame);
+            taken |= can_rx_frame(&ecu->rx, &ecu->drive.motor->bus_scales, &frame) == RX_ACCEPTED;
         }
     }
     can_rx_tick(&ecu->rx, ecu->clock.elapsed_us);
+    ecu_convert(ecu, taken);
 }
 
 /* Whether the board's hardware must hold the bridge: the firmware does not advance, or has no gate supply for the short
@@ -196,10 +198,7 @@ static void send_frames(ecu_t *ecu)
     }
     telemetry_read(&ecu->drive, &ecu->tx, &telemetry);
     ecu_telemetry(ecu, &telemetry);
-    telemetry.diagnostics.lost_frames = hal_can_lost();
-    telemetry.diagnostics.bus_off = hal_can_bus_off();
-    telemetry.diagnostics.stack_unused_bytes = hal_system_stack_unused();
-    telemetry.diagnostics.reset_cause = (uint32_t)hal_system_reset_cause();
+    ecu_diagnostics(ecu, &telemetry);
     for (tx_result_t r = can_tx_next(&ecu->tx, &telemetry, &frame); r != TX_NONE;
          r = can_tx_next(&ecu->tx, &telemetry, &frame)) {
         if (r == TX_NOT_A_NUMBER || !hal_can_send(&frame)) {

@@ -34,10 +34,17 @@ typedef struct {
     uint32_t us;       /* time for which the voltage has stayed near the reference */
 } settling_t;
 
+/** What the bus commands, per unit: converted when it comes. The battery's power limits count while they are alive. */
+typedef struct {
+    q15_t torque_requested, limit_drive, limit_regen;
+    q15_t power_drive, power_regen;
+} commanded_t;
+
 typedef struct {
     drive_t drive; /* first, so that the address of the ECU is also that of the drive */
     step_clock_t clock;
     can_rx_t rx;
+    commanded_t commanded; /* of rx */
     can_tx_t tx;
     second_level_t second_level;
     supervisor_t supervisor;

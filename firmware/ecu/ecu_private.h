@@ -14,6 +14,8 @@
 
 /* Checks that the interrupts advance and that the task is in time; once per step. */
 void ecu_watch(ecu_t *ecu);
+/* Converts what the bus commands to per unit, if a frame has been taken or no command is valid. */
+void ecu_convert(ecu_t *ecu, bool taken);
 supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault);
 arbitrate_in_t ecu_arbitration(const ecu_t *ecu);
 torque_limits_t ecu_limits(const ecu_t *ecu);
@@ -23,6 +25,8 @@ void ecu_check_dc_sensor(ecu_t *ecu);
 movement_request_t ecu_movement(const ecu_t *ecu);
 /* The part of the telemetry that comes from the bus and the state machine. */
 void ecu_telemetry(const ecu_t *ecu, telemetry_t *telemetry);
+/* Its counters of errors, if a message that contains them may be due. */
+void ecu_diagnostics(const ecu_t *ecu, telemetry_t *telemetry);
 
 /* Adds a part of the step that has run to the signature (signal/program_flow.h). */
 static inline void ecu_pass(ecu_t *ecu, flow_point_t point)

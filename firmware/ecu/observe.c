@@ -115,6 +115,21 @@ static q15_t power_per_unit(const ecu_t *ecu, float power_kW)
     return q15_from_si(1000.0F * power_kW, 1.5F * b->voltage_V * b->current_A);
 }
 
+void ecu_convert(ecu_t *ecu, bool taken)
+{
+    const can_rx_t *rx = &ecu->rx;
+    if (!taken && rx->command_channel.alive) { /* else a time-out may have cleared the command */
+        return;
+    }
+    ecu->commanded = (commanded_t){
+        .torque_requested = per_unit(ecu, rx->command.torque_requested_Nm),
+        .limit_drive = per_unit(ecu, rx->command.limit_drive_Nm),
+        .limit_regen = per_unit(ecu, rx->command.limit_regen_Nm),
+        .power_drive = power_per_unit(ecu, rx->limits.drive_kW),
+        .power_regen = power_per_unit(ecu, rx->limits.regen_kW),
+    };
+}
+
 /* Power limits of the battery. The torque limits are not among them: arbitration applies those, with its slew. When the
  * battery limits are lost, arbitration ramps the torque to zero; the last limits are kept meanwhile, because without
  * them the torque would rise at the start of the ramp. */
@@ -122,8 +137,8 @@ torque_limits_t ecu_limits(const ecu_t *ecu)
 {
     torque_limits_t limits = are_limits_lost(ecu) ? ecu->drive.request.limits : TORQUE_LIMITS_NONE;
     if (ecu->rx.limits_channel.alive) {
-        limits.power_drive = power_per_unit(ecu, ecu->rx.limits.drive_kW);
-        limits.power_regen = power_per_unit(ecu, ecu->rx.limits.regen_kW);
+        limits.power_drive = ecu->commanded.power_drive;
+        limits.power_regen = ecu->commanded.power_regen;
     }
     return limits;
 }
@@ -144,7 +159,6 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
     const bus_command_t *command = &ecu->rx.command;
     const sample_t *sample = sample_box_last(&drive->samples);
     const float v_dc_V = si_from_q15(sample->v_dc, drive->motor->bases.voltage_V);
-    const q15_t torque_requested = per_unit(ecu, command->torque_requested_Nm);
     const battery_voltage_in_t voltages = battery_voltage(ecu, v_dc_V);
     return (supervisor_in_t){
         .drive_faults = drive->fast.faults,
@@ -154,7 +168,7 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
         .current_mode = command->mode == COMMAND_MODE_CURRENT_LOCKED,
         .enable = command->enable,
         .reset = command->fault_reset,
-        .torque_requested_is_zero = fx_abs_q15(torque_requested) <= ecu->arbitration_config.dead_band,
+        .torque_requested_is_zero = fx_abs_q15(ecu->commanded.torque_requested) <= ecu->arbitration_config.dead_band,
         .torque_arbitrated_is_zero = ecu->arbitration_state.torque_arbitrated == 0,
         .dc_in_range = sample->v_dc >= drive->motor->monitor.v_min && sample->v_dc <= drive->motor->monitor.v_max,
         .dc_settled = is_dc_settled(ecu, sample->v_dc),
@@ -178,14 +192,14 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
 
 arbitrate_in_t ecu_arbitration(const ecu_t *ecu)
 {
-    const bus_command_t *command = &ecu->rx.command;
+    const commanded_t *commanded = &ecu->commanded;
     const supervisor_t *supervisor = &ecu->supervisor;
     /* At most the rated torque: a ramp to zero from a larger value would reach the machine late. */
     const q15_t max = are_limits_lost(ecu) ? (q15_t)0 : ecu->drive.motor->torque_max;
     return (arbitrate_in_t){
-        .torque_requested = per_unit(ecu, command->torque_requested_Nm),
-        .limit_drive = fx_clamp_q15(per_unit(ecu, command->limit_drive_Nm), 0, max),
-        .limit_regen = fx_clamp_q15(per_unit(ecu, command->limit_regen_Nm), 0, max),
+        .torque_requested = commanded->torque_requested,
+        .limit_drive = fx_clamp_q15(commanded->limit_drive, 0, max),
+        .limit_regen = fx_clamp_q15(commanded->limit_regen, 0, max),
         .omega = sample_box_last(&ecu->drive.samples)->point.omega,
         .run = supervisor_outputs[supervisor->state].run,
         .stop = !supervisor->enabled,
@@ -214,9 +228,7 @@ static request_limit_t request_limit(const ecu_t *ecu)
 
 void ecu_telemetry(const ecu_t *ecu, telemetry_t *telemetry)
 {
-    const can_rx_t *rx = &ecu->rx;
     const supervisor_t *s = &ecu->supervisor;
-    diagnostics_t *d = &telemetry->diagnostics;
     telemetry->state = s->state;
     telemetry->ecu_faults = s->faults;
     telemetry->first_fault = s->first_fault;
@@ -224,18 +236,7 @@ void ecu_telemetry(const ecu_t *ecu, telemetry_t *telemetry)
     telemetry->refused_reason = s->refused;
     telemetry->refused_count = s->refused_count;
     telemetry->derating_reason = derating_reason(ecu);
-    telemetry->request_limit = (uint32_t)request_limit(ecu);
-    d->crc_errors = rx->count[RX_CRC];
-    d->repeated = rx->count[RX_REPEATED];
-    d->jumps = rx->count[RX_JUMP];
-    d->length_errors = rx->count[RX_LENGTH];
-    d->range_errors = rx->count[RX_RANGE];
-    d->id_errors = rx->count[RX_ID];
-    d->ignored = rx->count[RX_IGNORED];
-    d->time_outs = rx->time_outs;
-    d->accepted = rx->accepted;
-    d->skipped = rx->skipped;
-    d->not_sent = ecu->not_sent;
-    d->task_overruns = ecu->liveness.task_overruns;
-    d->watchdog_held = ecu->liveness.held;
+    if (can_tx_may_send_limits(&ecu->tx)) {
+        telemetry->request_limit = (uint32_t)request_limit(ecu);
+    }
 }

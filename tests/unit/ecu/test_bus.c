@@ -167,6 +167,7 @@ void test_the_limit_of_the_drive_is_not_below_the_torque_that_is_still_arbitrate
     const int arbitrated = ecu.drive.request.torque_arbitrated;
     TEST_ASSERT_GREATER_THAN_INT(5000, arbitrated);
     ecu.rx.command.limit_drive_Nm = ecu.rx.command.limit_regen_Nm = 1.0F;
+    ecu_convert(&ecu, true);
     ecu.drive.task.allowed.torque_limited = (q15_t)arbitrated;
     ecu_task_1khz(&ecu);
     TEST_ASSERT_GREATER_THAN_INT(4000, ecu.drive.request.torque_arbitrated);

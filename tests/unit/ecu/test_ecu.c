@@ -108,6 +108,7 @@ void test_the_vehicles_limits_reach_the_drive_in_the_same_step(void)
     ecu.rx.command.limit_drive_Nm = 29.4664F;
     ecu.rx.command.limit_regen_Nm = 58.9328F;
     ecu.rx.command_channel.alive = true;
+    ecu_convert(&ecu, true);
     tasks(1);
     TEST_ASSERT_EQUAL_INT(3277, ecu.drive.request.limits.torque_drive);
     TEST_ASSERT_EQUAL_INT(6554, ecu.drive.request.limits.torque_regen);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "ecu/ecu_private.h"
 #include "hal/mock_angle.h"
+#include "hal/mock_can.h"
 #include "hal/mock_system.h"
 #include "unity.h"
 
@@ -19,6 +20,7 @@ void setUp(void)
     hal_angle_is_absolute_IgnoreAndReturn(true);
     ecu_init(&ecu, &motor);
     ecu.clock.elapsed_us = US;
+    ecu.tx.pending = UINT16_MAX; /* each message */
     sample = (sample_t){.v_dc = (int32_t)(350.0 * COUNT_PER_V)};
 }
 
@@ -31,8 +33,22 @@ static const supervisor_in_t *observe(void)
 {
     *sample_box_begin(&ecu.drive.samples) = sample;
     sample_box_publish(&ecu.drive.samples);
+    ecu_convert(&ecu, true);
     seen = ecu_observe(&ecu, false);
     return &seen;
+}
+
+/* From what the bus commands now. */
+static arbitrate_in_t arbitration(void)
+{
+    ecu_convert(&ecu, true);
+    return ecu_arbitration(&ecu);
+}
+
+static torque_limits_t battery_limits(void)
+{
+    ecu_convert(&ecu, true);
+    return ecu_limits(&ecu);
 }
 
 static const supervisor_in_t *observe_v(double v_dc_V)
@@ -424,28 +440,43 @@ void test_arbitrated_torque_is_zero_only_when_not_one_count_is_left(void)
 void test_the_requested_torque_is_converted_and_limited_to_the_range_of_the_format(void)
 {
     ecu.rx.command.torque_requested_Nm = 29.4664F;
-    TEST_ASSERT_EQUAL_INT(3277, ecu_arbitration(&ecu).torque_requested);
+    TEST_ASSERT_EQUAL_INT(3277, arbitration().torque_requested);
     ecu.rx.command.torque_requested_Nm = -29.4664F;
-    TEST_ASSERT_EQUAL_INT(-3277, ecu_arbitration(&ecu).torque_requested);
+    TEST_ASSERT_EQUAL_INT(-3277, arbitration().torque_requested);
     ecu.rx.command.torque_requested_Nm = 295.0F;
-    TEST_ASSERT_EQUAL_INT(32767, ecu_arbitration(&ecu).torque_requested);
+    TEST_ASSERT_EQUAL_INT(32767, arbitration().torque_requested);
     ecu.rx.command.torque_requested_Nm = -295.0F;
-    TEST_ASSERT_EQUAL_INT(-32767, ecu_arbitration(&ecu).torque_requested);
+    TEST_ASSERT_EQUAL_INT(-32767, arbitration().torque_requested);
+}
+
+/* A valid command is converted when it comes; a time-out clears it in a step without a frame. */
+void test_a_command_is_converted_with_its_frame_and_in_each_step_without_a_valid_one(void)
+{
+    ecu.rx.command_channel.alive = true;
+    ecu.rx.command.torque_requested_Nm = 29.4664F;
+    ecu_convert(&ecu, false);
+    TEST_ASSERT_EQUAL_INT(0, ecu.commanded.torque_requested);
+    ecu_convert(&ecu, true);
+    TEST_ASSERT_EQUAL_INT(3277, ecu.commanded.torque_requested);
+    ecu.rx.command_channel.alive = false;
+    ecu.rx.command.torque_requested_Nm = 0.0F;
+    ecu_convert(&ecu, false);
+    TEST_ASSERT_EQUAL_INT(0, ecu.commanded.torque_requested);
 }
 
 void test_torque_limits_are_never_larger_than_the_machines_torque_nor_negative(void)
 {
     ecu.rx.command.limit_drive_Nm = 500.0F;
     ecu.rx.command.limit_regen_Nm = 29.4664F;
-    TEST_ASSERT_EQUAL_INT(TORQUE_MAX, ecu_arbitration(&ecu).limit_drive);
-    TEST_ASSERT_EQUAL_INT(3277, ecu_arbitration(&ecu).limit_regen);
+    TEST_ASSERT_EQUAL_INT(TORQUE_MAX, arbitration().limit_drive);
+    TEST_ASSERT_EQUAL_INT(3277, arbitration().limit_regen);
     ecu.rx.command.limit_drive_Nm = 29.4664F;
     ecu.rx.command.limit_regen_Nm = 500.0F;
-    TEST_ASSERT_EQUAL_INT(3277, ecu_arbitration(&ecu).limit_drive);
-    TEST_ASSERT_EQUAL_INT(TORQUE_MAX, ecu_arbitration(&ecu).limit_regen);
+    TEST_ASSERT_EQUAL_INT(3277, arbitration().limit_drive);
+    TEST_ASSERT_EQUAL_INT(TORQUE_MAX, arbitration().limit_regen);
     ecu.rx.command.limit_drive_Nm = ecu.rx.command.limit_regen_Nm = -1.0F;
-    TEST_ASSERT_EQUAL_INT(0, ecu_arbitration(&ecu).limit_drive);
-    TEST_ASSERT_EQUAL_INT(0, ecu_arbitration(&ecu).limit_regen);
+    TEST_ASSERT_EQUAL_INT(0, arbitration().limit_drive);
+    TEST_ASSERT_EQUAL_INT(0, arbitration().limit_regen);
 }
 
 void test_state_enable_command_and_faults_decide_whether_torque_runs_stops_or_ramps_out(void)
@@ -454,19 +485,19 @@ void test_state_enable_command_and_faults_decide_whether_torque_runs_stops_or_ra
     ecu.supervisor = (supervisor_t){.state = STATE_RUN, .enabled = true};
     sample.point.omega = -12345;
     (void)observe();
-    arbitrate_in_t in = ecu_arbitration(&ecu);
+    arbitrate_in_t in = arbitration();
     TEST_ASSERT_TRUE(in.run && !in.stop && !in.ramp_out);
     TEST_ASSERT_EQUAL_INT32(-12345, in.omega);
     ecu.supervisor.enabled = false;
-    in = ecu_arbitration(&ecu);
+    in = arbitration();
     TEST_ASSERT_TRUE(in.run && in.stop && !in.ramp_out);
     ecu.supervisor.faults = ECU_FAULT_PROTECTION;
-    TEST_ASSERT_TRUE(ecu_arbitration(&ecu).ramp_out);
+    TEST_ASSERT_TRUE(arbitration().ramp_out);
     ecu.supervisor.faults = 0;
     ecu.rx.command_channel.alive = false;
-    TEST_ASSERT_TRUE(ecu_arbitration(&ecu).ramp_out);
+    TEST_ASSERT_TRUE(arbitration().ramp_out);
     ecu.supervisor.state = STATE_READY;
-    TEST_ASSERT_FALSE(ecu_arbitration(&ecu).run);
+    TEST_ASSERT_FALSE(arbitration().run);
 }
 
 /* P_b = 1.5 * 540 V * 400 A = 324 kW: 32.4 kW are 3276.7 counts. */
@@ -474,18 +505,18 @@ void test_the_batterys_power_limits_act_while_they_arrive(void)
 {
     ecu.rx.limits = (bus_power_limits_t){.drive_kW = 32.4F, .regen_kW = 16.2F};
     ecu.drive.request.limits = (torque_limits_t){.torque_drive = 1, .power_drive = 2, .power_regen = 3}; /* of before */
-    torque_limits_t limits = ecu_limits(&ecu);
+    torque_limits_t limits = battery_limits();
     TEST_ASSERT_EQUAL_INT(Q15_MAX, limits.power_drive);
     TEST_ASSERT_EQUAL_INT(Q15_MAX, limits.power_regen);
     TEST_ASSERT_EQUAL_INT(Q15_MAX, limits.torque_drive);
     ecu.rx.limits_channel = (rx_channel_t){.alive = true, .seen = true};
-    limits = ecu_limits(&ecu);
+    limits = battery_limits();
     TEST_ASSERT_INT_WITHIN(1, 3276, limits.power_drive);
     TEST_ASSERT_INT_WITHIN(1, 1638, limits.power_regen);
     TEST_ASSERT_EQUAL_INT(Q15_MAX, limits.torque_drive);
     TEST_ASSERT_EQUAL_INT(Q15_MAX, limits.torque_regen);
     ecu.rx.limits.drive_kW = 325.0F;
-    TEST_ASSERT_EQUAL_INT(Q15_MAX, ecu_limits(&ecu).power_drive);
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, battery_limits().power_drive);
 }
 
 void test_lost_battery_limits_keep_the_last_ones_end_the_torque_and_are_the_reported_reason(void)
@@ -495,13 +526,13 @@ void test_lost_battery_limits_keep_the_last_ones_end_the_torque_and_are_the_repo
     ecu.drive.task.derating = DERATING_INVERTER;
     ecu.rx.command.limit_drive_Nm = ecu.rx.command.limit_regen_Nm = 100.0F;
     ecu.rx.limits_channel = (rx_channel_t){.alive = true, .seen = true};
-    TEST_ASSERT_GREATER_THAN_INT(0, ecu_arbitration(&ecu).limit_drive);
+    TEST_ASSERT_GREATER_THAN_INT(0, arbitration().limit_drive);
     TEST_ASSERT_EQUAL_UINT32(1, reported_derating_reason());
     ecu.rx.limits_channel.alive = false;
-    const torque_limits_t limits = ecu_limits(&ecu);
+    const torque_limits_t limits = battery_limits();
     TEST_ASSERT_EQUAL_MEMORY(&last, &limits, sizeof last);
-    TEST_ASSERT_EQUAL_INT(0, ecu_arbitration(&ecu).limit_drive);
-    TEST_ASSERT_EQUAL_INT(0, ecu_arbitration(&ecu).limit_regen);
+    TEST_ASSERT_EQUAL_INT(0, arbitration().limit_drive);
+    TEST_ASSERT_EQUAL_INT(0, arbitration().limit_regen);
     TEST_ASSERT_EQUAL_UINT32(7, reported_derating_reason());
     TEST_ASSERT_TRUE(observe()->derated);
 }
@@ -721,7 +752,18 @@ void test_every_counter_of_the_bus_reaches_its_place_in_the_telemetry(void)
                                     .refused = REFUSED_SENSOR_IMPLAUSIBLE,
                                     .refused_count = 7};
     telemetry_t t = {0};
+    hal_can_lost_IgnoreAndReturn(207);
+    hal_can_bus_off_IgnoreAndReturn(208);
+    hal_system_stack_unused_IgnoreAndReturn(209);
+    ecu.tx.pending = 0;
+    ecu_diagnostics(&ecu, &t); /* no message contains the counters */
+    TEST_ASSERT_EQUAL_UINT32(0, t.diagnostics.crc_errors);
+    ecu.tx.pending = UINT16_MAX;
     ecu_telemetry(&ecu, &t);
+    ecu_diagnostics(&ecu, &t);
+    TEST_ASSERT_EQUAL_UINT32(207, t.diagnostics.lost_frames);
+    TEST_ASSERT_EQUAL_UINT32(208, t.diagnostics.bus_off);
+    TEST_ASSERT_EQUAL_UINT32(209, t.diagnostics.stack_unused_bytes);
     TEST_ASSERT_EQUAL_UINT32(100 + RX_CRC, t.diagnostics.crc_errors);
     TEST_ASSERT_EQUAL_UINT32(100 + RX_REPEATED, t.diagnostics.repeated);
     TEST_ASSERT_EQUAL_UINT32(100 + RX_JUMP, t.diagnostics.jumps);
