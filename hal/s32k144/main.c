@@ -74,7 +74,7 @@ static inline FX_INLINED void run_period(void)
 }
 
 /* Apart from the handler: without alarms, which are rare, it saves no registers of its own. */
-static FX_NOT_INLINED FX_COLD void run_period_after_alarms(void)
+static FX_NOT_INLINED FX_COLD void after_alarms(void)
 {
     alarms_take();
     run_period();
@@ -83,7 +83,7 @@ static FX_NOT_INLINED FX_COLD void run_period_after_alarms(void)
 void adc_handler(void)
 {
     if (alarms.any != 0U) {
-        run_period_after_alarms();
+        after_alarms();
     } else {
         run_period();
     }

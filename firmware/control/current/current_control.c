@@ -121,11 +121,10 @@ static int32_t remaining_voltage(int32_t other)
  * What the d axis lacks is subtracted from q: only a smaller q flux gives the d axis its voltage (CC-14). */
 static dq_q15_t limit_to_circle(dq_q15_t v, int32_t error_d, int32_t turn)
 {
-    int32_t d_max = Q15_MAX;
+    int32_t d = fx_sat_q15_word(v.d);
     if (error_d > 0) {
-        d_max = fx_max_s32(remaining_voltage(fx_sat_q15_word(v.q)), V_D_MIN);
+        d = clamp_symmetric(d, fx_max_s32(remaining_voltage(fx_sat_q15_word(v.q)), V_D_MIN));
     }
-    const int32_t d = clamp_symmetric(v.d, d_max);
     const int32_t excess = fx_sat_q15_word(v.d - d);
     const int32_t sign = turn >> 31; /* 0 or -1: with two's complement an excess of 0 changes nothing */
     const int32_t q = v.q + (excess ^ sign) - sign;
