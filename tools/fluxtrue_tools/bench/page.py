@@ -178,8 +178,14 @@ def _modules(figures: Figures) -> list[str]:
     return table("module|  flash |  RAM ", rows)
 
 
+def _call_path(names: list[str]) -> str:
+    """Without its middle if it is too long for a cell."""
+    shown = " → ".join(names)
+    return shown if len(shown) <= COLUMNS else " → ".join([*names[:2], "…", *names[-4:]])
+
+
 def _stack(figures: Figures) -> list[str]:
-    rows = ((x["level"], x["frame"] or "", x["stack"], f"`{' → '.join(x['path'])}`")
+    rows = ((x["level"], x["frame"] or "", x["stack"], f"`{_call_path(x['path'])}`")
             for x in figures["stack"]["levels"])  # fmt: skip
     return table("priority, lowest first|  exception frame |  stack |deepest path", rows)
 
