@@ -87,6 +87,11 @@ bool can_tx_due(can_tx_t *tx)
     return tx->pending != 0U;
 }
 
+static uint32_t bit_of(uint32_t number)
+{
+    return 1U << number;
+}
+
 static bool is_pending(const can_tx_t *tx, uint32_t of_messages)
 {
     return ((uint32_t)tx->pending & of_messages) != 0U;
@@ -94,33 +99,33 @@ static bool is_pending(const can_tx_t *tx, uint32_t of_messages)
 
 bool can_tx_may_send_temperatures(const can_tx_t *tx)
 {
-    return is_pending(tx, 1U << NUMBER_inv_temperatures);
+    return is_pending(tx, bit_of(NUMBER_inv_temperatures));
 }
 
 bool can_tx_may_send_identification(const can_tx_t *tx)
 {
-    return is_pending(tx, 1U << NUMBER_inv_identification);
+    return is_pending(tx, bit_of(NUMBER_inv_identification));
 }
 
 bool can_tx_may_send_status(const can_tx_t *tx)
 {
-    return is_pending(tx, 1U << NUMBER_inv_status);
+    return is_pending(tx, bit_of(NUMBER_inv_status));
 }
 
 bool can_tx_may_send_limits(const can_tx_t *tx)
 {
-    return is_pending(tx, 1U << NUMBER_inv_limits);
+    return is_pending(tx, bit_of(NUMBER_inv_limits));
 }
 
 bool can_tx_may_send_voltage_or_currents(const can_tx_t *tx)
 {
-    return is_pending(tx, 1U << NUMBER_inv_dc_link | 1U << NUMBER_inv_currents);
+    return is_pending(tx, bit_of(NUMBER_inv_dc_link) | bit_of(NUMBER_inv_currents));
 }
 
 bool can_tx_may_send_diagnostics(const can_tx_t *tx)
 {
-    return is_pending(tx, 1U << NUMBER_inv_diag_protection | 1U << NUMBER_inv_diag_receive | 1U << NUMBER_inv_diag_bus |
-                              1U << NUMBER_inv_diag_task);
+    return is_pending(tx, bit_of(NUMBER_inv_diag_protection) | bit_of(NUMBER_inv_diag_receive) |
+                              bit_of(NUMBER_inv_diag_bus) | bit_of(NUMBER_inv_diag_task));
 }
 
 tx_result_t can_tx_next(can_tx_t *tx, const telemetry_t *telemetry, can_frame_t *frame)
