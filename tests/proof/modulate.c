@@ -73,12 +73,10 @@ void proof_voltage_circle(void)
     ASSUME(WITHIN(v.d, -(1 << 30), 1 << 30) && WITHIN(v.q, -(1 << 30), 1 << 30) && IS_Q15(omega));
     const dq_q15_t limited = limit_to_circle(v, error_d, omega);
     PROVE(IS_Q15(limited.d) && IS_Q15(limited.q));
-    if (error_d <= 0) {
-        PROVE(limited.q <= remaining_voltage(limited.d) && limited.q >= -remaining_voltage(limited.d) - 1);
-    } else {
-        const int32_t d_max = (remaining_voltage(limited.q) > V_D_MIN) ? remaining_voltage(limited.q) : V_D_MIN;
-        PROVE(limited.d <= d_max && limited.d >= -d_max - 1);
-    }
+    PROVE(limited.q <= remaining_voltage(limited.d) && limited.q >= -remaining_voltage(limited.d) - 1);
+    const int32_t left = remaining_voltage(fx_sat_q15_word(v.q));
+    const int32_t d_max = (left > V_D_MIN) ? left : V_D_MIN;
+    PROVE(error_d <= 0 || (limited.d <= d_max && limited.d >= -d_max - 1));
     PROVE((v.d >= 0) == (limited.d >= 0));
 }
 

@@ -72,7 +72,6 @@ def test_the_emulated_drive_exceeds_no_annotation(measured: Measured) -> None:
 @pytest.mark.parametrize(
     ("function", "statement", "passes"),
     [
-        ("second_level_own_data_step", "for", 4),
         ("e2e_crc", "for (unsigned n", 7),
         ("project_covariance", "for (unsigned j", 7),
         ("kalman_predict", "for (unsigned l", 7),
