@@ -89,7 +89,7 @@ static void take(capture_t *capture, int16_t *memory, const capture_source_t *so
 {
     const capture_config_t *config = &capture->config;
     const uint32_t at = capture->at;
-    columns_copy(capture, &memory[at * config->signals], next, source->step, count);
+    columns_copy(capture, &memory[(size_t)at * config->signals], next, source->step, count);
     capture->next += count * config->divisor;
     capture->at = (uint16_t)((at + count == config->samples) ? 0U : at + count);
 }
