@@ -81,6 +81,8 @@ static inline int64_t two_words(int32_t a, int32_t b)
 }
 KERNEL2(two_words, int64_t, int32_t, int32_t, two_words(a, b))
 KERNEL2(load_two_words, int32_t, int32_t, int32_t, fx_load_two_words((const int32_t[2]){a, b}).second)
+KERNEL2(load_nine_words, int32_t, int32_t, int32_t,
+        fx_load_nine_words(&(const fx_nine_words_t){a, b, a, b, a, b, a, b, b}).i)
 KERNEL1(neg_q31, q31_t, q31_t, fx_neg_q31(a))
 KERNEL1(abs_q31, q31_t, q31_t, fx_abs_q31(a))
 KERNEL1(round_q15, q15_t, int32_t, fx_round_q15(a))
