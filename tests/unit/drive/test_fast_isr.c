@@ -566,7 +566,7 @@ static void raise_voltage(void)
     seam_period();
 }
 
-void test_an_over_voltage_shorts_the_phases_if_the_task_has_decided_so(void)
+static void run_until_over_voltage_shorts(void)
 {
     seam_run();
     seam_periods(3);
@@ -574,6 +574,11 @@ void test_an_over_voltage_shorts_the_phases_if_the_task_has_decided_so(void)
     raise_voltage();
     TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_VOLTAGE, drive.fast.faults);
     expect_shorted(true);
+}
+
+void test_an_over_voltage_shorts_the_phases_if_the_task_has_decided_so(void)
+{
+    run_until_over_voltage_shorts();
     seam_periods(30); /* the task keeps the short circuit while the voltage is high */
     expect_shorted(true);
     seam_voltage(350.0);
@@ -624,12 +629,7 @@ void test_an_over_voltage_after_one_of_the_sensor_shorts_the_phases_again(void)
     seam_periods(20);
     drive.request.fault_resets++;
     seam_periods(34); /* a step of the task begins with the next period */
-    seam_run();
-    seam_periods(3);
-    write_command(SAFE_SHORT_ON_OVER_VOLTAGE, 0);
-    raise_voltage();
-    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_VOLTAGE, drive.fast.faults);
-    expect_shorted(true);
+    run_until_over_voltage_shorts();
 }
 
 static bool is_needed(uint32_t faults, safe_t safe)
