@@ -8,13 +8,12 @@
  *   use                                                   tick         fast ISR
  *   FX_LOAD_TWO       angle tracker, state and gains      2
  *                     current control, integrators        1
+ *                     current control, anti-windup        1            1
  *                     window of the identification                     3
  *                     monitor.h: currents, dc voltage                  1 each
  *                     hal/s32k144/angle_quadrature.c                   1
  *   fx_both_loaded    window, sums stored together                     2
  *                     modulation: slopes, gains           1 each       1, 0
- *                     current control, integrators        1            1
- *                     flux tables, magnet's flux and g                 3
  *   fx_in_register    current control, speed              2            4
  *                     modulation: level, half a duty      3 each       1, 2
  *                     modulation: limited pulses          up to 3      up to 2

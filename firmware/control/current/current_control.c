@@ -84,18 +84,12 @@ static int32_t unlimited_voltage(int32_t sigma_q24, int32_t weighted_q30, int32_
     return fx_mulhi_add(s_and_ff_q30 >> 8, sigma_q24, weighted_q30 - psi * 32768);
 }
 
-static void store(current_control_state_t *state, int32_t s_d_q30, int32_t s_q_q30)
-{
-    fx_both_loaded(&s_d_q30, &s_q_q30); /* one instruction */
-    *state = (current_control_state_t){s_d_q30, s_q_q30};
-}
-
 /* s += a_i (sigma + j w') e: Q15 * Q15 = Q30 with gains below 1/2. |s| <= 1, so that the sum of s and the rotational
  * voltage fits Q30. gains: of the turned error, of the error. */
 static void integrate(current_control_state_t *state, current_control_state_t s, fx_pair_t gains, fx_pair_t error)
 {
-    store(state, fx_sat_bits(fx_difference2_cross_acc(s.s_d_q30, error, gains), 31),
-          fx_sat_bits(fx_dot2_acc(s.s_q_q30, error, gains), 31));
+    *state = (current_control_state_t){fx_sat_bits(fx_difference2_cross_acc(s.s_d_q30, error, gains), 31),
+                                       fx_sat_bits(fx_dot2_acc(s.s_q_q30, error, gains), 31)};
 }
 
 /* 1/(v_ratio v_dc), Q25 (CC-15), at most 64. Q31/Q15 = Q16. */
@@ -163,7 +157,8 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     const dq_q15_t change = {limited.d - v.d, limited.q - v.q};
     const int32_t gain_q33 = fx_mul_q31_word(config->tracking_gain_q34, in->v_dc); /* per unit of v: Q34 * Q15 */
     const fx_two_words_t next = FX_LOAD_TWO(state, s_d_q30, s_q_q30);
-    store(state, anti_windup(next.first, gain_q33, change.d), anti_windup(next.second, gain_q33, change.q));
+    *state = (current_control_state_t){anti_windup(next.first, gain_q33, change.d),
+                                       anti_windup(next.second, gain_q33, change.q)};
     return (current_control_out_t){
         .u = u,
         .v = fx_pair(limited.d, limited.q),
