@@ -9,6 +9,10 @@
  * Errors   a broken sensor is reported up to 8 steps later, by the values of hal/temperature.h
  * Context  1 kHz task, once per step, before hal_temperature_winding_dC() and hal_temperature_inverter_dC() */
 
+#define TEMPERATURE_CYCLE_STEPS 8U
+#define TEMPERATURE_WINDING_TURN 0U
+#define TEMPERATURE_INVERTER_TURN 4U
+
 void temperature_tick(void);
 
 #endif

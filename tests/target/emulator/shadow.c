@@ -11,10 +11,12 @@
 #include "hal/host/port.h"
 #include "hal/s32k144/ntc.h"
 #include "hal/s32k144/reference.h"
+#include "hal/s32k144/temperature.h"
 #include "hal/temperature.h"
 
 enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69, TASK_VECTOR = 16 + 48, GATE_VECTOR = 16 + 103 };
 #define PWM_TICK_S (1.0 / 112e6)
+#define TEMPERATURE_STEPS "temperature_steps" /* of hal/s32k144/temperature.c */
 enum { ENCODER_SHIFT = 18, CAPTURED = 0x80 };
 
 /* Computes the angle as hal/s32k144/angle_quadrature.c and angle_resolver.c do, from the values that they have read. An
@@ -58,11 +60,42 @@ static double temperature(uint32_t count, bool *broken)
     return *broken ? 0.0 : dC / 10.0;
 }
 
-void temperatures_take(const emulated_t *e, fluxtrue_t *host)
+static void winding_take(const emulated_t *e, fluxtrue_t *host)
 {
     host->winding_C = temperature((uint32_t)emu_register(e->emu, "ADC0.R2"), &host->board.winding_broken);
+}
+
+static void inverter_take(const emulated_t *e, fluxtrue_t *host)
+{
     host->board.inverter_C = temperature((uint32_t)emu_register(e->emu, "ADC1.R2"), &host->board.inverter_broken);
+}
+
+static void reference_take(const emulated_t *e, fluxtrue_t *host)
+{
     host->board.known_share = reference_permille((uint16_t)emu_register(e->emu, "ADC1.R3")) / 1000.0;
+}
+
+void temperatures_take(const emulated_t *e, fluxtrue_t *host)
+{
+    winding_take(e, host);
+    inverter_take(e, host);
+    reference_take(e, host);
+}
+
+/* In the steps in which the image converts them, as hal/s32k144/temperature.c does; the shadow keeps what it has in
+ * between. */
+static void temperatures_in_turn_take(const emulated_t *e, fluxtrue_t *host)
+{
+    uint32_t steps = 0;
+    (void)emu_read(e->emu, emu_symbol(e->emu, TEMPERATURE_STEPS), &steps, sizeof steps);
+    const uint32_t turn = steps % TEMPERATURE_CYCLE_STEPS;
+    if (turn == TEMPERATURE_WINDING_TURN || host->board.winding_broken) {
+        winding_take(e, host);
+    }
+    if (turn == TEMPERATURE_INVERTER_TURN || host->board.inverter_broken) {
+        inverter_take(e, host);
+    }
+    reference_take(e, host);
 }
 
 /* The task reads all its inputs when it begins, long before the next interrupt, so the shadow computes the whole task
@@ -71,7 +104,7 @@ void temperatures_take(const emulated_t *e, fluxtrue_t *host)
 static void task_begins(emulated_t *e)
 {
     const drive_t before = e->shadow->drive;
-    temperatures_take(e, e->shadow);
+    temperatures_in_turn_take(e, e->shadow);
     task_1khz(&e->shadow->drive);
     e->task_result = e->shadow->drive;
     e->shadow->drive = before;
@@ -150,7 +183,7 @@ bool shadow_start(emulated_t *e)
     if (e->shadow == NULL) {
         e->shadow = fluxtrue_create();
     }
-    if (e->shadow == NULL) {
+    if (e->shadow == NULL || emu_symbol(e->emu, TEMPERATURE_STEPS) == 0U) {
         return false;
     }
     mirror_pull(&e->mirror);
@@ -161,6 +194,7 @@ bool shadow_start(emulated_t *e)
     e->shadow->drive.parameters = own.parameters;
     e->shadow->drive.data_check = own.data_check;
     shadow_inputs(e);
+    temperatures_take(e, e->shadow);
     emu_on_exception(e->emu, follow, e);
     return true;
 }
