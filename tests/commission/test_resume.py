@@ -77,6 +77,19 @@ def test_resume_wants_a_work_folder(folder: Path, tmp_path: Path, capsys: pytest
     assert "--resume: wanted: --work" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("there", [None, "notes.txt"])
+def test_resume_wants_the_folder_of_an_earlier_run(
+    there: str | None, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hidden, "make", interrupted)  # is not called: nothing moves a second time by mistake
+    if there is not None:
+        (tmp_path / "work").mkdir()
+        (tmp_path / "work" / there).write_text("of something else")
+    assert commission(folder, tmp_path, *MACHINE, "--step", "resistance", "--resume") == 2
+    said = capsys.readouterr().err
+    assert said.count("error: ") == 1 and "steps.json: missing, so no step has ended there, allowed: " in said
+
+
 def test_what_is_kept_is_what_was_found(tmp_path: Path) -> None:
     wiring = Connection(3, True, 0.25)
     found = Found(1.5 - 0.5j, 2.0, Followed(7.5, -3.01, 0.1, wiring), spin.Spun(wiring, 0.16, 1e-4, 2e-4, 1e-5, 400.0),

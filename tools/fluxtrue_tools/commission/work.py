@@ -93,8 +93,9 @@ class Work:
                 raise ValueError("it was changed after it had been written")
             belongs, steps = dict(data["belongs"]), tuple(map(str, data["steps"]))
             found = Found(**{name: _decoded(data["found"][name]) for name in KEPT})
-        except FileNotFoundError:
-            return (), Found()
+        except FileNotFoundError as error:
+            raise FluxtrueError(f"{self._path}: missing, so no step has ended there, allowed: the --work of an earlier "
+                                "run, or no --resume to begin with the first step") from error  # fmt: skip
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             said = " ".join(str(error).split())
             raise FluxtrueError(f"{self._path}: not the steps of a commissioning ({said}), allowed: the file as "
