@@ -13,6 +13,7 @@ from pathlib import Path
 from elftools.dwarf.die import DIE
 from elftools.elf.elffile import ELFFile
 
+from fluxtrue_tools import debug_info
 from fluxtrue_tools.bench.disassembly import plain
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.target.image import RAM_FROM, Image, Size
@@ -115,34 +116,23 @@ def library(build: Path) -> dict[str, int]:
     return dict(bytes_of)
 
 
-def _struct(typed: DIE) -> DIE:
-    while typed.tag != "DW_TAG_structure_type":
-        typed = typed.get_DIE_from_attribute("DW_AT_type")
-    return typed
-
-
-def _size(die: DIE) -> int:
-    while "DW_AT_byte_size" not in die.attributes:
-        die = die.get_DIE_from_attribute("DW_AT_type")
-    return int(die.attributes["DW_AT_byte_size"].value)
-
-
-def _members(elf: ELFFile, type_name: str) -> dict[str, int]:
+def _members(elf: ELFFile, type_name: str) -> dict[str, DIE]:
+    """Names and types."""
     for unit in elf.get_dwarf_info().iter_CUs():
-        for die in unit.iter_DIEs():
-            name = die.attributes.get("DW_AT_name")
-            if die.tag == "DW_TAG_typedef" and name is not None and name.value.decode() == type_name:
-                members = [m for m in _struct(die).iter_children() if m.tag == "DW_TAG_member"]
-                return {m.attributes["DW_AT_name"].value.decode(): _size(m.get_DIE_from_attribute("DW_AT_type"))
-                        for m in members}  # fmt: skip
+        for die in unit.get_top_DIE().iter_children():
+            if die.tag == "DW_TAG_typedef" and debug_info.name(die) == type_name:
+                members = [m for m in debug_info.bare(die).iter_children() if m.tag == "DW_TAG_member"]
+                return {debug_info.name(m): m.get_DIE_from_attribute("DW_AT_type") for m in members}
     raise FluxtrueError(f"no debug information for the type '{type_name}'")
 
 
 def state(elf: Path) -> dict[str, int]:
     """Bytes of RAM of each part of drive_t. Of the samples two slots hand over, the others are the scope's history."""
     file = ELFFile(BytesIO(elf.read_bytes()))
-    parts, slot = _members(file, "drive_t"), _members(file, "sample_box_t")["slot"]
-    handed_over = _members(file, "sample_box_t")["generation"] + 2 * slot
+    parts = {name: debug_info.size(kind) for name, kind in _members(file, "drive_t").items()}
+    samples = _members(file, "sample_box_t")
+    slot = debug_info.size(samples["slot"]) // debug_info.elements(samples["slot"])
+    handed_over = debug_info.size(samples["generation"]) + 2 * slot
     return parts | {"samples": handed_over, "history": parts["samples"] - handed_over}
 
 

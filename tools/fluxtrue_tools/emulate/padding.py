@@ -12,8 +12,8 @@ from typing import Final
 from elftools.dwarf.die import DIE
 from elftools.elf.elffile import ELFFile
 
+from fluxtrue_tools.debug_info import bare, elements
 from fluxtrue_tools.errors import FluxtrueError
-from fluxtrue_tools.sim.members import bare, elements
 
 _ADDRESS: Final = 0x03  # DW_OP_addr
 _DECLARED: Final = ("DW_AT_specification", "DW_AT_abstract_origin")  # the latter: after optimization across files

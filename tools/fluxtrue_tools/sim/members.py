@@ -5,7 +5,6 @@ Tests use them to plant a fault in memory, and to read what no name of fluxtrue_
 """
 
 import ctypes
-import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,6 +15,8 @@ from typing import Any, Final
 from elftools.dwarf.die import DIE
 from elftools.elf.elffile import ELFFile
 
+from fluxtrue_tools.debug_info import bare, size
+from fluxtrue_tools.debug_info import name as name_of
 from fluxtrue_tools.errors import FluxtrueError
 
 INSTANCE: Final = "fluxtrue"  # struct of hal/host/instance.h
@@ -26,36 +27,6 @@ _SIGNED_INTEGERS: Final = {1: ctypes.c_int8, 2: ctypes.c_int16, 4: ctypes.c_int3
 _FLOATS: Final = {4: ctypes.c_float, 8: ctypes.c_double}
 
 
-def _name(die: DIE) -> str:
-    found = die.attributes.get("DW_AT_name")
-    return found.value.decode() if found else ""
-
-
-def bare(die: DIE) -> DIE:
-    """The type without typedef, const and volatile."""
-    while die.tag in ("DW_TAG_typedef", "DW_TAG_const_type", "DW_TAG_volatile_type"):
-        die = die.get_DIE_from_attribute("DW_AT_type")
-    return die
-
-
-def _length(subrange: DIE) -> int:
-    """gcc gives the last index, clang the number."""
-    given = subrange.attributes
-    return int(given["DW_AT_count"].value) if "DW_AT_count" in given else int(given["DW_AT_upper_bound"].value) + 1
-
-
-def elements(array: DIE) -> int:
-    """Number of elements of an array of any dimensions."""
-    return math.prod(_length(child) for child in array.iter_children() if child.tag == "DW_TAG_subrange_type")
-
-
-def _size(die: DIE) -> int:
-    die = bare(die)
-    if die.tag == "DW_TAG_array_type":
-        return elements(die) * _size(die.get_DIE_from_attribute("DW_AT_type"))
-    return int(die.attributes["DW_AT_byte_size"].value)
-
-
 def _member(die: DIE, name: str) -> tuple[DIE, int] | None:
     """Type and offset of a member, also of one in an unnamed struct or union."""
     for child in die.iter_children():
@@ -64,9 +35,9 @@ def _member(die: DIE, name: str) -> tuple[DIE, int] | None:
         at = child.attributes.get("DW_AT_data_member_location")
         offset = int(at.value) if at else 0
         kind = child.get_DIE_from_attribute("DW_AT_type")
-        if _name(child) == name:
+        if name_of(child) == name:
             return kind, offset
-        if not _name(child) and (inner := _member(bare(kind), name)):
+        if not name_of(child) and (inner := _member(bare(kind), name)):
             return inner[0], offset + inner[1]
     return None
 
@@ -89,7 +60,7 @@ class Members:
             die, offset = found[0], offset + found[1]
             for index in re.findall(r"\d+", match[2]):
                 element = bare(bare(die).get_DIE_from_attribute("DW_AT_type"))
-                die, offset = element, offset + int(index) * _size(element)
+                die, offset = element, offset + int(index) * size(element)
         return offset, _number(member, bare(die))
 
     def read(self, address: int, member: str) -> float:
@@ -112,7 +83,7 @@ def _pointers(die: DIE, path: str) -> Iterator[str]:
     elif die.tag in ("DW_TAG_structure_type", "DW_TAG_union_type"):
         for child in die.iter_children():
             if child.tag == "DW_TAG_member":
-                inside = ".".join(part for part in (path, _name(child)) if part)
+                inside = ".".join(part for part in (path, name_of(child)) if part)
                 yield from _pointers(child.get_DIE_from_attribute("DW_AT_type"), inside)
 
 
@@ -123,11 +94,11 @@ def pointers(path: str) -> list[str]:
 
 def _number(member: str, die: DIE) -> Any:
     if die.tag == "DW_TAG_enumeration_type":
-        return _INTEGERS[_size(die)]
+        return _INTEGERS[size(die)]
     if die.tag == "DW_TAG_base_type":
         encoding = int(die.attributes["DW_AT_encoding"].value)
         kinds = _FLOATS if encoding == _FLOAT else _SIGNED_INTEGERS if encoding in _SIGNED else _INTEGERS
-        return kinds[_size(die)]
+        return kinds[size(die)]
     raise FluxtrueError(f"{member}: not a number")
 
 
@@ -145,6 +116,6 @@ def members(path: str) -> Members:
         raise FluxtrueError(f"{path}: no debug information, allowed: a build with -g, as the presets make it")
     for unit in elf.get_dwarf_info().iter_CUs():
         for die in unit.get_top_DIE().iter_children():
-            if die.tag == "DW_TAG_structure_type" and _name(die) == INSTANCE and "DW_AT_byte_size" in die.attributes:
+            if die.tag == "DW_TAG_structure_type" and name_of(die) == INSTANCE and "DW_AT_byte_size" in die.attributes:
                 return Members(path, die)
     raise FluxtrueError(f"{path}: no struct {INSTANCE} in its debug information")
