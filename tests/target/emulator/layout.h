@@ -6,9 +6,8 @@
  * Source   drive/drive.h
  * Context  emulator only */
 
-/* The request and the calibration. The image itself writes the first LAYOUT_TRIMMED of them as well: the request, and
- * the dead-time compensation that its task trims, with the complements that belong to both. */
-#define LAYOUT_TRIMMED 4
+/* The request and the calibration, with their complements. The image writes to some of them as well: to the request and
+ * to the dead time that its task trims. */
 #define LAYOUT_INPUTS(X) \
     X(request)                \
     X(parameters.modulate)    \

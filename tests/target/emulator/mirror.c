@@ -85,10 +85,7 @@ bool mirror_same_motor(mirror_t *mirror)
 void mirror_pull(mirror_t *mirror)
 {
     if (mirror->pulled_at != emu_now(mirror->emu)) {
-        if (!mirror->waiting) {
-            copy_from_image(mirror, 0, LAYOUT_TRIMMED);
-        }
-        copy_from_image(mirror, mirror->inputs, mirror->parts);
+        copy_from_image(mirror, mirror->waiting ? mirror->inputs : 0, mirror->parts);
         mirror->pulled_at = emu_now(mirror->emu);
     }
 }
@@ -96,11 +93,26 @@ void mirror_pull(mirror_t *mirror)
 int mirror_set(mirror_t *mirror, const char *name, double value)
 {
     if (!mirror->waiting) {
-        copy_from_image(mirror, 0, LAYOUT_TRIMMED); /* the rest of the calibration is changed by the host only */
+        copy_from_image(mirror, 0, mirror->inputs);
+        mirror->found = mirror->host->drive;
     }
     const int code = fluxtrue_set(mirror->host, name, value);
     mirror->waiting = mirror->waiting || code == FLUXTRUE_OK;
     return code;
+}
+
+/* Writes the bytes that were set. The others are the image's: what was copied while an activity ran is old by now, and
+ * may have been half written. */
+static void part_push(mirror_t *mirror, int i)
+{
+    const mirror_part_t *part = &mirror->part[i];
+    const uint8_t *wanted = host_address(mirror, mirror->host, i);
+    const uint8_t *found = (const uint8_t *)&mirror->found + part->host_offset;
+    for (uint32_t at = 0; at < part->size; at++) {
+        if (wanted[at] != found[at]) {
+            (void)emu_write(mirror->emu, mirror->base + part->image_offset + at, &wanted[at], 1);
+        }
+    }
 }
 
 bool mirror_push(mirror_t *mirror)
@@ -109,10 +121,9 @@ bool mirror_push(mirror_t *mirror)
         return false;
     }
     for (int i = 0; i < mirror->inputs; i++) {
-        const mirror_part_t *part = &mirror->part[i];
-        (void)emu_write(mirror->emu, mirror->base + part->image_offset, host_address(mirror, mirror->host, i),
-                        part->size);
+        part_push(mirror, i);
     }
+    copy_from_image(mirror, 0, mirror->inputs);
     mirror->waiting = false;
     return true;
 }

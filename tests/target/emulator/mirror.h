@@ -3,7 +3,8 @@
 #define EMULATOR_MIRROR_H
 /** Access to the drive in the emulated memory by the names of the software-in-the-loop library: a drive_t on the host
  * is kept equal to the one in the image, part by part, and fluxtrue_get() and fluxtrue_set() work on it. Setting writes
- * the request (or the calibration) into the image's memory, as a debugger would: no CAN command is needed.
+ * the request (or the calibration) into the image's memory, as a debugger would: no CAN command is needed. Only what
+ * was set is written, because the image writes to the same parts: to the request, and to the dead time that it trims.
  * Source   layout.h
  * Errors   mirror_open() returns NULL, or a text that says what is wrong
  * Context  emulator only; between two runs */
@@ -20,6 +21,7 @@ typedef struct {
 typedef struct {
     emu_t *emu;
     fluxtrue_t *host;
+    drive_t found; /* the host's before the first of the values that wait was set */
     uint32_t base;
     mirror_part_t part[MIRROR_PARTS_MAX];
     int inputs, parts;

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is set by name reaches the image's memory, and nothing else in it changes, whatever the image has written
+meanwhile."""
+
+import struct
+
+import pytest
+
+from fluxtrue_tools.bench.image import Stand
+from fluxtrue_tools.emulate.build import Parts
+from fluxtrue_tools.emulate.core import Core
+from fluxtrue_tools.emulate.preempt import TASK
+from fluxtrue_tools.sim.library import Loop
+
+MODULATE, COMPLEMENTS, FIRST = 1, 2, 4  # parts of layout.h; FIRST: the first of the parameters
+DEAD_TIME = 16  # offset in modulate_config_t
+
+
+class DeadTime:
+    """The dead time in the image's memory and its complement, which the task writes one after the other."""
+
+    def __init__(self, core: Core, parts: Parts) -> None:
+        self._core = core
+        offsets = [offset for offset, _ in struct.iter_unpack("<2I", parts.layout.read_bytes())]
+        base = core.symbol("ecu")
+        self._live = base + offsets[MODULATE] + DEAD_TIME
+        self._complement = self._live + offsets[COMPLEMENTS] - offsets[FIRST]
+        assert self.words == (self.words[0], ~self.words[0])
+
+    @property
+    def words(self) -> tuple[int, int]:
+        """The word and its complement, as signed numbers."""
+        word, complement = (struct.unpack("<i", self._core.read(at, 4))[0] for at in (self._live, self._complement))
+        return word, complement
+
+    def write(self, value: int) -> None:
+        """The first of the task's two stores."""
+        self._core.write(self._live, struct.pack("<i", value))
+
+    def accept(self, value: int) -> None:
+        """The second one."""
+        self._core.write(self._complement, struct.pack("<i", ~value))
+
+
+def run_into_task(loop: Loop, core: Core) -> None:
+    """Run until a period ends while the task runs: what is set then waits for the next one."""
+    for _ in range(20):
+        loop.run(1)
+        if core.active_vector == TASK:
+            return
+    raise AssertionError("the task never runs at the end of a period")
+
+
+@pytest.fixture
+def busy(drive: Loop) -> Loop:
+    """A drive whose task has its full length; it does not trim the dead time itself."""
+    for name, value in (("trim", 0), ("torque_loop", 1), ("identification", 1), ("enable", 1)):
+        drive.set(name, value)
+    drive.run(1000)
+    return drive
+
+
+@pytest.mark.parametrize("stores_before", [0, 1, 2])
+def test_what_the_task_writes_while_something_set_is_waiting_stays(
+    busy: Loop, parts: Parts, stores_before: int
+) -> None:
+    drive, core = busy, Stand(busy).core
+    dead_time = DeadTime(core, parts)
+    value = dead_time.words[0] - 2
+    stores = [dead_time.write, dead_time.accept]
+    run_into_task(drive, core)
+    for store in stores[:stores_before]:
+        store(value)
+    drive.set("torque_requested_Nm", 20)
+    for store in stores[stores_before:]:
+        store(value)
+    drive.run(300)  # every word is checked at least once
+    assert dead_time.words == (value, ~value)
+    assert drive.get("fault_word") == 0
+    assert drive.get("truth.torque_Nm") == pytest.approx(20, abs=3)
+
+
+def test_what_is_set_before_and_while_the_task_runs_reaches_the_image(busy: Loop) -> None:
+    """The flags of the request have a check word of their own, which the host renews."""
+    core = Stand(busy).core
+    run_into_task(busy, core)
+    for name, value in (("torque_requested_Nm", 30), ("torque_loop", 0), ("torque_loop", 1), ("identification", 0)):
+        busy.set(name, value)
+    busy.run(300)
+    assert busy.get("truth.torque_Nm") == pytest.approx(30, abs=3)
+    run_into_task(busy, core)
+    busy.set("enable", 0)
+    busy.run(30)
+    assert core.outputs == 0
+    busy.set("enable", 1)
+    busy.set("current_mode", 1)
+    busy.run(300)
+    assert core.outputs == 0x3F
+    assert busy.get("truth.torque_Nm") == pytest.approx(0, abs=3)
+    assert busy.get("fault_word") == 0
