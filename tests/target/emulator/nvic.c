@@ -11,6 +11,7 @@
  * sleep, wake-up                                   | yes      | test_a_sleeping_core_is_woken_by_each_tick
  * a vector without a handler                       | refused  | test_what_is_not_modelled_is_an_error
  * MPU, faults as exceptions                        | refused  | test_what_is_not_modelled_is_an_error
+ * an interrupt within an IT block: taken after it  | yes      | test_an_interrupt_at_any_instruction_changes_no_result
  * lazy stacking, tail-chaining, late arrival       | no       | -
  */
 #include <string.h>

@@ -10,7 +10,7 @@ import pytest
 from conftest import Program
 
 from fluxtrue_tools.bench import image
-from fluxtrue_tools.emulate.core import Core, EmulationStoppedError
+from fluxtrue_tools.emulate.core import BREAK, Core, EmulationStoppedError
 
 WATCHDOG = 0x20
 
@@ -101,6 +101,41 @@ def test_what_follows_an_access_in_an_it_block_is_not_conditional(
     with Core.of_program(library, elf, counting) as core:
         core.run(1e-3)
         assert [core.word("sum", k) for k in range(4)] == [0x77] * 4
+
+
+def _it_blocks(elf: Path) -> list[list[int]]:
+    """The addresses of the instructions of each IT block."""
+    listing = subprocess.run(["arm-none-eabi-objdump", "-d", str(elf)], check=True, capture_output=True, text=True)
+    code = [line.split("\t") for line in listing.stdout.splitlines() if line.count("\t") >= 2]
+    addresses = [int(words[0].strip(" :"), 16) for words in code]
+    sizes = {k: len(words[2].strip()) - 1 for k, words in enumerate(code) if set(words[2].strip()) <= set("ite")}
+    return [addresses[k + 1 : k + 1 + size] for k, size in sizes.items()]
+
+
+def test_an_interrupt_at_any_instruction_changes_no_result(library: ctypes.CDLL, program: Program) -> None:
+    """Flags, registers and memory of IT blocks with every condition; the core takes no interrupt within a block."""
+    elf = program("interrupted")
+    with Core.of_program(library, elf, counting=True) as core:
+        start = core.save()
+        core.run(1e-3)
+        undisturbed, length = core.word("sum"), core.instructions
+        enabled_after = 100
+        points: list[int] = []
+        for n in range(enabled_after, length):
+            core.restore(start)
+            core.break_after(n)
+            if core.run(1e-3) != BREAK or core.word("done") == 1:
+                break
+            core.pend(16 + 10)
+            core.run(1e-3)
+            assert (core.word("done"), core.word("interrupts"), core.word("sum")) == (1, 1, undisturbed), n
+            points.append(core.word("from"))
+        core.free(start)
+    blocks = _it_blocks(elf)
+    assert len(blocks) > 14 * 4
+    assert set(points).isdisjoint(address for block in blocks for address in block)
+    follow = {block[-1] + size for block in blocks for size in (2, 4)}
+    assert len(follow.intersection(points)) >= 14 * 4
 
 
 LOW, MIDDLE, HIGH, LPIT = (16 + irq for irq in (10, 11, 12, 48))
