@@ -41,7 +41,8 @@ static bool update_mean(const frozen_angle_config_t *config, frozen_angle_state_
     if (in->behind || has_moved(config, state, in)) {
         state->i_ref = in->i_ref;
         state->theta_e = in->theta_e;
-        state->standing = 0;
+        state->standing = 1; /* the next step begins the mean */
+        return false;
     }
     const int shift = (state->standing < MOVING_STEPS) ? 0 : MEAN_SHIFT;
     state->mean_q8.d = mean_step(state->mean_q8.d, u_sum.d * 256, shift);

@@ -72,7 +72,8 @@ static bool update_means(const launch_power_config_t *config, launch_power_state
     state->theta_e = in->theta_e;
     if (moved || in->behind) {
         state->i_ref = (dq_q15_halfword_t){(q15_t)in->i_ref.d, (q15_t)in->i_ref.q};
-        state->steady = 0;
+        state->steady = 1; /* the next step begins the means */
+        return false;
     }
     const int shift = (state->steady < MOVING_STEPS) ? 0 : MEAN_SHIFT;
     const int32_t power = other_power(in, omega);

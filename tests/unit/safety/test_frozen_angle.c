@@ -390,10 +390,12 @@ void test_means_and_decisions_are_those_of_the_twin(void)
         in.psi_ref = (n % 7 == 0) ? (dq_q15_t){uniform(0, 15000), uniform(-15000, 15000)} : in.psi_ref;
         (void)step();
         const double beyond = mover_step(&twin);
-        TEST_ASSERT_DOUBLE_WITHIN(0.05, twin.m[0], state.mean_q8.d / 256.0);
-        TEST_ASSERT_DOUBLE_WITHIN(0.05, twin.m[1], state.mean_q8.q / 256.0);
-        TEST_ASSERT_DOUBLE_WITHIN(4.5, twin.first[0], state.first_q8.d / 256.0);
-        TEST_ASSERT_DOUBLE_WITHIN(4.5, twin.first[1], state.first_q8.q / 256.0);
+        if (twin.standing > 1) { /* the step that begins anew leaves the means to the next one */
+            TEST_ASSERT_DOUBLE_WITHIN(0.05, twin.m[0], state.mean_q8.d / 256.0);
+            TEST_ASSERT_DOUBLE_WITHIN(0.05, twin.m[1], state.mean_q8.q / 256.0);
+            TEST_ASSERT_DOUBLE_WITHIN(4.5, twin.first[0], state.first_q8.d / 256.0);
+            TEST_ASSERT_DOUBLE_WITHIN(4.5, twin.first[1], state.first_q8.q / 256.0);
+        }
         TEST_ASSERT_EQUAL_INT(twin.standing, state.standing);
         if (fabs(beyond) > 12.0) {
             TEST_ASSERT_EQUAL_INT(beyond > 0.0, state.frozen > 0);
