@@ -206,10 +206,12 @@ typedef struct {
     q15_t psi_d_error;
     uint32_t faults;
     int16_t inverter_dC, winding_dC;
-    int16_t known_permille; /* hal_adc_known_permille() */
-    q15_t lag;              /* of the tracked speed, torque_monitor_lag() */
-    bool mrai_is_chosen;    /* the paper's identification, throughout this step */
-    bool gates;             /* as read back: the switches follow the duties */
+    int16_t known_permille;  /* hal_adc_known_permille() */
+    q15_t lag;               /* of the tracked speed, torque_monitor_lag() */
+    q15_t i_magnitude;       /* of the sample's current */
+    dq_q15_t i_mean, u_mean; /* over the step, drive/step_mean.h */
+    bool mrai_is_chosen;     /* the paper's identification, throughout this step */
+    bool gates;              /* as read back: the switches follow the duties */
     bool angle_absolute;
     bool shorted; /* drive_is_shorted() */
 } snapshot_t;

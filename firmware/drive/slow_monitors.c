@@ -2,7 +2,6 @@
 #include "drive/slow_monitors.h"
 
 #include "control/current/transform.h"
-#include "drive/step_mean.h"
 
 static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
 {
@@ -36,7 +35,7 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q
         .voltage_limited = sample->voltage_limited,
         .i = sample->point.i,
         .i_ref = task->i_ref,
-        .i_mean = step_mean_current(drive, snapshot),
+        .i_mean = snapshot->i_mean,
         .u_behind = u_behind,
         .phases = measure_phases(sample->i_ab, sample->zero_q28),
         .phases_ref = at_once ? phases_ref : in_phases(expected, sample->theta_e),
@@ -56,10 +55,11 @@ static uint32_t check_torque(drive_t *drive, const snapshot_t *snapshot)
     const torque_monitor_in_t in = {
         .acting = sample->acting && !drive_bypasses_torque_path(drive),
         .u = sample->point.u,
-        .u_mean = step_mean_voltage(drive, snapshot),
+        .u_mean = snapshot->u_mean,
         .i = sample->point.i,
         .psi = {sample->point.flux.psi_d, sample->point.flux.psi_q},
         .omega = fx_q15_from_q31(sample->point.omega),
+        .current = snapshot->i_magnitude,
         .torque = fx_q15_from_q31(task->torque_loop.model),
         .winding_dC = snapshot->winding_dC,
     };
@@ -121,8 +121,7 @@ static bool is_near_reference(const drive_t *drive, dq_q15_t i)
  * about their reference; after a jump of a sensor's gain only the mean of one step does. */
 static bool is_controlled(const drive_t *drive, const snapshot_t *snapshot)
 {
-    return is_near_reference(drive, snapshot->sample.point.i) ||
-           is_near_reference(drive, step_mean_current(drive, snapshot));
+    return is_near_reference(drive, snapshot->sample.point.i) || is_near_reference(drive, snapshot->i_mean);
 }
 
 /* A prediction replaces a sample that no rotor can have (AT-14), and a rotor that stops within milliseconds may look

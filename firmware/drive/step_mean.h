@@ -11,9 +11,8 @@
  * Context  1 kHz task; no division */
 #include "drive/drive.h"
 
-dq_q15_t step_mean_current(const drive_t *drive, const snapshot_t *snapshot);
-/** Of the acting voltage. */
-dq_q15_t step_mean_voltage(const drive_t *drive, const snapshot_t *snapshot);
+/** Means of current and acting voltage, and the magnitude of the sample's current, into the snapshot. */
+void step_mean_take(const drive_t *drive, snapshot_t *snapshot);
 /** The sums of a window as means. */
 dq_q15_t step_mean_of(const drive_t *drive, dq_q15_t sum);
 

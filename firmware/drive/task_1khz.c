@@ -49,7 +49,7 @@ static voltage_reserve_t update_voltage_reserve(drive_t *drive, const snapshot_t
 {
     task_state_t *task = &drive->task;
     const voltage_reserve_in_t in = {
-        .u = step_mean_voltage(drive, snapshot),
+        .u = fx_magnitude(snapshot->u_mean.d, snapshot->u_mean.q),
         .v_dc = (q15_t)snapshot->sample.v_dc,
         .psi = task->psi_ref,
         .psi_plan = task->reference.psi_plan,
@@ -79,6 +79,7 @@ static q15_t limit_torque(drive_t *drive, const snapshot_t *snapshot)
         .limits = switch_off_holds(drive) ? &no_torque : &drive->request.limits,
         .u = snapshot->sample.point.u,
         .i = snapshot->sample.point.i,
+        .current = snapshot->i_magnitude,
         .torque_estimated = task->identification.torque_estimated,
         .omega = fx_q15_from_q31(snapshot->sample.point.omega),
         .v_dc = (q15_t)snapshot->sample.v_dc,
@@ -221,6 +222,7 @@ static void take_snapshot(const drive_t *drive, snapshot_t *snapshot)
     snapshot->known_permille = hal_adc_known_permille();
     snapshot->lag = torque_monitor_lag(&drive->motor->torque_monitor, &drive->task.torque_monitor,
                                        fx_q15_from_q31(snapshot->sample.point.omega));
+    step_mean_take(drive, snapshot);
 }
 
 void task_1khz(drive_t *drive)

@@ -2,6 +2,7 @@
 #include "safety/plausibility.h"
 
 #include "fx/q.h"
+#include "fx/sqrt.h"
 #include "fx/vec.h"
 #include "signal/debounce.h"
 #include "signal/mean.h"
@@ -14,13 +15,20 @@
 #define EQUAL_MAX 4 /* q15: two values of measure_phases() for the same counts differ by 2 2.2 LSB at most */
 #define DEVIATION_UNLIMITED 5 /* per step while the voltage is not limited: confirmed in a fifth of the time */
 
+/* d^2 + q^2, Q30. Comparing squares saves the root. */
+static uint32_t squared(int32_t d, int32_t q)
+{
+    const q15_t x = fx_sat_q15(d), y = fx_sat_q15(q);
+    return (uint32_t)fx_mul_q30(x, x) + (uint32_t)fx_mul_q30(y, y);
+}
+
 /* (MN-1); samples without a deviation decrease the count. current: the magnitude of the expected one. */
 static uint32_t deviation(const plausibility_config_t *config, plausibility_state_t *state, const plausibility_in_t *in,
                           q15_t current)
 {
     const dq_q15_t i_ref = state->expected;
-    const q15_t error = fx_magnitude(fx_sat_q15(in->i.d - i_ref.d), fx_sat_q15(in->i.q - i_ref.q));
-    const bool bad = error > config->e_0 + (current >> 3);
+    const uint32_t limit = (uint32_t)config->e_0 + ((uint32_t)current >> 3);                /* below 2^15 + 2^12 */
+    const bool bad = squared(in->i.d - i_ref.d, in->i.q - i_ref.q) > limit * limit + limit; /* (limit + 1/2)^2 */
     const int32_t step = bad ? (in->voltage_limited ? 1 : DEVIATION_UNLIMITED) : -DEVIATION_UNLIMITED;
     state->deviation = (int16_t)fx_clamp_q31(state->deviation + step, 0, config->deviation_steps);
     return (state->deviation >= config->deviation_steps) ? FAULT_CONTROL : 0;
@@ -51,13 +59,14 @@ static uint32_t lost_phases(const plausibility_config_t *config, plausibility_st
     return (a_lost || b_lost || c_lost) ? FAULT_PHASE_LOST : 0U;
 }
 
-/* Distance of a deviation from its own mean over 8 steps. Each axis of the deviation is limited to e_max. */
-static int32_t distance_from_mean(dq_q15_t *mean_x8, dq_q15_t i, dq_q15_t i_ref, int32_t e_max)
+/* Square of the distance of a deviation from its own mean over 8 steps, Q30. Each axis of the deviation is limited to
+ * e_max. */
+static uint32_t distance_from_mean(dq_q15_t *mean_x8, dq_q15_t i, dq_q15_t i_ref, int32_t e_max)
 {
     const int32_t d = fx_clamp_q31(i.d - i_ref.d, -e_max, e_max), q = fx_clamp_q31(i.q - i_ref.q, -e_max, e_max);
     const dq_q15_t ripple = {d - (mean_x8->d >> 3), q - (mean_x8->q >> 3)};
     *mean_x8 = (dq_q15_t){mean_x8->d + ripple.d, mean_x8->q + ripple.q};
-    return fx_magnitude(fx_sat_q15(ripple.d), fx_sat_q15(ripple.q));
+    return squared(ripple.d, ripple.q);
 }
 
 /* (MN-11): an open switch removes one half wave of a phase current. In the rotor frame that is an oscillation about the
@@ -67,9 +76,10 @@ static uint32_t oscillation(const plausibility_config_t *config, plausibility_st
                             const plausibility_in_t *in)
 {
     const int32_t e_max = config->ripple_max * 4;
-    const int32_t of_sample = distance_from_mean(&state->sample_x8, in->i, state->expected, e_max);
-    const int32_t of_step = distance_from_mean(&state->step_x8, in->i_mean, state->expected, e_max);
-    state->ripple_x16 += fx_max_s32(of_sample, of_step) - (state->ripple_x16 >> 4);
+    const uint32_t of_sample = distance_from_mean(&state->sample_x8, in->i, state->expected, e_max);
+    const uint32_t of_step = distance_from_mean(&state->step_x8, in->i_mean, state->expected, e_max);
+    const int32_t larger = fx_sqrt_q30((of_sample > of_step) ? of_sample : of_step);
+    state->ripple_x16 += larger - (state->ripple_x16 >> 4);
     const bool bad = (state->ripple_x16 >> 4) > config->ripple_max;
     return debounce_step(&state->oscillating, bad, config->ripple_steps, FAULT_CONTROL);
 }

@@ -139,8 +139,7 @@ uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monit
         return 0;
     }
     const dq_q15_t rate = flux_rate(config, state, in->psi);
-    const machine_t now = {follow_speed(config, state, in->omega), resistance(config, in->winding_dC),
-                           fx_magnitude(in->i.d, in->i.q)};
+    const machine_t now = {follow_speed(config, state, in->omega), resistance(config, in->winding_dC), in->current};
     const dq_q15_t psi_mean = {(in->psi.d + state->psi.d) / 2, (in->psi.q + state->psi.q) / 2};
     state->psi = in->psi;
     state->omega = in->omega;

@@ -58,6 +58,7 @@ typedef struct {
     q15_t omega;        /* tracked: lags behind the rotor */
     q15_t torque;       /* commanded, as the closed loop follows it */
     int16_t winding_dC; /* or one of types/temperature.h */
+    q15_t current;      /* magnitude of i */
 } torque_monitor_in_t;
 
 /** Lag of the tracked speed behind the rotor's beyond the apparent lag that one count of the sensor causes, else 0

@@ -26,8 +26,8 @@ typedef enum {
     IDENTIFY_STATES
 } identify_index_t;
 
-/** The tables' flux changes with this state and those behind it; beside them only the magnet's flux changes psi. */
-#define IDENTIFY_FIRST_OF_TABLES IDENTIFY_LQ
+/** The flux depends on this state and on those behind it. */
+#define IDENTIFY_FIRST_OF_FLUX IDENTIFY_FLUX
 
 typedef struct {
     uint8_t l_shift;           /* of the flux tables */

@@ -157,7 +157,7 @@ static corrected_t correct(const identify_config_t *config, const identify_state
 {
     dq_q30_t shift = state->kept.local;
     int32_t value[IDENTIFY_STATES];
-    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+    for (unsigned j = IDENTIFY_FIRST_OF_FLUX; j < IDENTIFY_STATES; j++) {
         value[j] = identify_value(config, state, (identify_index_t)j) >> 1;
         shift.d = fx_add_q31(shift.d, identify_mul(value[j], m->psi_d.h_q30[j]));
         shift.q = fx_add_q31(shift.q, identify_mul(value[j], m->psi_q.h_q30[j]));

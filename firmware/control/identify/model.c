@@ -49,7 +49,7 @@ static void jacobian_rows(const identify_config_t *config, const identify_point_
     const dq_q15_t i = {fx_q15_from_q31(point->i.d), fx_q15_from_q31(point->i.q)};
     const int32_t magnitude = fx_magnitude(i.d, i.q);
     const int32_t length = fx_max_s32(magnitude, config->i_smooth);
-    for (unsigned j = IDENTIFY_FIRST_OF_TABLES; j < IDENTIFY_STATES; j++) {
+    for (unsigned j = IDENTIFY_FIRST_OF_FLUX; j < IDENTIFY_STATES; j++) {
         m->now.d.h_q30[j] = -identify_mul(w, m->psi_q.h_q30[j]);
         m->now.q.h_q30[j] = identify_mul(w, m->psi_d.h_q30[j]);
     }
@@ -66,17 +66,25 @@ static void jacobian_rows(const identify_config_t *config, const identify_point_
     per_sigma(config, &m->now.q);
 }
 
+/* What nothing below writes and somebody reads: clearing the whole model would take eight times as long. */
+static void clear_constants(identify_model_t *m)
+{
+    m->psi_d.h_q30[IDENTIFY_FLUX] = m->psi_q.h_q30[IDENTIFY_FLUX] = 0;
+    m->psi_d.h_q30[IDENTIFY_LQ] = m->psi_q.h_q30[IDENTIFY_LD] = 0;
+}
+
 void identify_model(const identify_config_t *config, const identify_point_t *point, const identify_tables_t *tables,
                     q31_t r_prior, identify_model_t *model)
 {
-    *model = (identify_model_t){.current = false};
+    clear_constants(model);
     flux_derivatives(config, tables, point, model);
     jacobian_rows(config, point, r_prior, model);
 }
 
 void identify_torque_row(const identify_config_t *config, const identify_model_t *m, jacobian_row_t *row)
 {
-    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+    row->h_q30[IDENTIFY_R] = row->h_q30[IDENTIFY_DROP] = 0;
+    for (unsigned j = IDENTIFY_FIRST_OF_FLUX; j < IDENTIFY_STATES; j++) {
         row->h_q30[j] = identify_mul(m->psi_d.h_q30[j], m->i_m.q) - identify_mul(m->psi_q.h_q30[j], m->i_m.d);
     }
     row->h_q30[IDENTIFY_FLUX] = m->i_m.q;

@@ -36,9 +36,10 @@ typedef struct {
     identify_measurement_t now; /* with every state at its prior, without noise */
     dq_q30_t psi;               /* of the tables, at i_m */
     dq_q30_t i_m;
-    dq_q30_t iron_i;             /* change of i_m with the scale of the iron loss */
-    bool current;                /* the current is large enough to define the direction of the voltage drop */
-    jacobian_row_t psi_d, psi_q; /* change of psi with each state but the magnet's flux, for which it is 1 */
+    dq_q30_t iron_i; /* change of i_m with the scale of the iron loss */
+    bool current;    /* the current is large enough to define the direction of the voltage drop */
+    /* Change of psi with each state from IDENTIFY_FIRST_OF_FLUX on; 0 for the magnet's flux, for which it is 1. */
+    jacobian_row_t psi_d, psi_q;
 } identify_model_t;
 
 void identify_model(const identify_config_t *config, const identify_point_t *point, const identify_tables_t *tables,

@@ -4,7 +4,6 @@
 #include "fx/codegen.h"
 #include "fx/div.h"
 #include "fx/q.h"
-#include "fx/vec.h"
 
 #define LOSS_MAX Q31(0.25)
 #define FACTOR_SENSOR_LOST Q15(0.5)
@@ -41,9 +40,9 @@ static int32_t derating_factor(const derating_line_t *at, int32_t x)
 /* (LM-2). Both products are rounded half up, so that the mean has no bias. */
 static int32_t loss_step(const torque_limit_config_t *config, torque_limit_state_t *state, const torque_limit_in_t *in)
 {
-    const q15_t current = fx_magnitude(in->i.d, in->i.q);
     const int32_t electrical = fx_mul_q15(in->u.d, in->i.d) + fx_mul_q15(in->u.q, in->i.q);
-    const int32_t now = electrical - fx_mul_q15(in->torque_estimated, in->omega) + fx_mul_q15(config->drop, current);
+    const int32_t now = electrical - fx_mul_q15(in->torque_estimated, in->omega) +
+                        fx_mul_q15(config->drop, in->current);
     const int32_t error = fx_sat_q15_word(now - fx_q15_from_q31(state->loss));
     const q31_t moved = fx_add2_q31(state->loss, config->loss_rate * error);
     state->loss = fx_clamp_q31(moved, 0, LOSS_MAX);

@@ -64,6 +64,7 @@ typedef struct {
     int32_t torque_arbitrated;
     const torque_limits_t *limits;
     dq_q15_t u, i;
+    int32_t current; /* magnitude of i */
     int32_t torque_estimated;
     int32_t omega;
     int32_t v_dc;

@@ -13,8 +13,7 @@ voltage_reserve_t voltage_reserve_step(const voltage_reserve_config_t *config, v
 {
     const int32_t psi = fx_magnitude(in->psi.d, in->psi.q);
     const int32_t with_magnet = fx_magnitude(fx_sat_q15_word(in->psi.d + in->psi_d_error), in->psi.q);
-    const int32_t u = fx_magnitude(in->u.d, in->u.q);
-    const int32_t reserve = fx_mul_q15(config->v_ratio, in->v_dc) - u;
+    const int32_t reserve = fx_mul_q15(config->v_ratio, in->v_dc) - in->u;
     const bool on_limit = psi > in->psi_plan - (in->psi_plan >> ON_LIMIT_SHIFT);
 
     int32_t error = -fx_q15_from_q31(state->trim);

@@ -32,7 +32,7 @@ typedef struct {
 
 /** q15 in words, which are loaded without a sign extension. */
 typedef struct {
-    dq_q15_t u; /* acting voltage, mean over the last step where there is one */
+    int32_t u; /* magnitude of the acting voltage, of the mean over the last step where there is one; q15 */
     int32_t v_dc;
     dq_q15_t psi;        /* tables' flux at the last reference */
     int32_t psi_plan;    /* of the last reference */

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "fixture.h"
+#include "fx/vec.h"
 #include "unity.h"
 
 static fixture_t f;
@@ -39,6 +40,7 @@ void tearDown(void)
 
 static torque_limit_t step(void)
 {
+    in.current = fx_magnitude(in.i.d, in.i.q);
     return torque_limit_step(&f.torque_limit, &state, &in);
 }
 

@@ -365,7 +365,7 @@ static bool is_power_compared(dq_q15_t of_sample, dq_q15_t of_mean)
     setUp();
     drive.task.i_ref = (dq_q15_t){-2000, I_Q};
     snapshot.sample.point.i = (dq_q15_t){of_sample.d - 2000, of_sample.q + I_Q};
-    snapshot.window.sum_i = (dq_q15_t){10 * (of_mean.d - 2000), 10 * (of_mean.q + I_Q)};
+    snapshot.i_mean = (dq_q15_t){of_mean.d - 2000, of_mean.q + I_Q};
     steps(2);
     TEST_ASSERT_EQUAL_UINT8(1, drive.task.frozen_angle.standing);
     if (drive.task.launch_power.steady == 1) {

@@ -459,7 +459,7 @@ void test_the_power_of_a_launch_is_compared_while_sample_or_mean_of_the_current_
         (void)slow_monitors_step(&drive, &snapshot);
     }
     TEST_ASSERT_EQUAL_INT(3, drive.task.launch_power.steady);
-    snapshot.window.sum_i.d = 10 * off;
+    snapshot.i_mean.d = off;
     (void)slow_monitors_step(&drive, &snapshot);
     TEST_ASSERT_EQUAL_INT(0, drive.task.launch_power.steady);
 }

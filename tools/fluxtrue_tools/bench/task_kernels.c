@@ -5,6 +5,7 @@
 #include "drive/drive.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/slow_monitors.h"
+#include "drive/step_mean.h"
 #include "ecu/arbitration.h"
 #include "ecu/supervisor.h"
 #include "fx/vec.h"
@@ -88,6 +89,7 @@ CALLED void task_copy(void)
     snapshot.faults = copy.fast.faults;
     snapshot.inverter_dC = hal_temperature_inverter_dC();
     snapshot.winding_dC = hal_temperature_winding_dC();
+    step_mean_take(&copy, &snapshot);
     prepare_scopes();
 }
 
@@ -138,6 +140,7 @@ CALLED void task_torque_limit(void)
         .limits = &d->request.limits,
         .u = snapshot.sample.point.u,
         .i = snapshot.sample.point.i,
+        .current = snapshot.i_magnitude,
         .torque_estimated = d->task.identification.torque_estimated,
         .omega = fx_q15_from_q31(snapshot.sample.point.omega),
         .v_dc = (q15_t)snapshot.sample.v_dc,
@@ -167,7 +170,7 @@ CALLED void task_reference(void)
 {
     drive_t *d = the_copy();
     const voltage_reserve_in_t voltage = {
-        .u = snapshot.sample.point.u,
+        .u = fx_magnitude(snapshot.u_mean.d, snapshot.u_mean.q),
         .v_dc = (q15_t)snapshot.sample.v_dc,
         .psi = d->task.psi_ref,
         .psi_plan = d->task.reference.psi_plan,
