@@ -16,13 +16,15 @@
  *                     modulation: slopes, gains           1 each       1, 0
  *   fx_in_register    current control, speed              2            4
  *                     modulation: level, half a duty      3 each       1, 2
- *                     modulation: limited pulses          up to 3      up to 2
+ *                     modulation: limited pulses          up to 4      up to 2
+ *                     modulation: middle phase                         0.8
  *                     hal/s32k144/pwm.c: rounding, rise                2, 3
  *   fx_read_two       hal/s32k144/sampling.c                           3
  *   FX_ADDRESS_ONCE   slot of the sample                               18
  *                     timer of hal/s32k144/pwm.c                       2
  *                     slot of the command                              2
  *                     point of the sine table             2            2 (1 kHz task: 11)
+ *                     table of the circle                 up to 1
  *   FX_PADDING_WORD   sample                                           9 to 11
  *   FX_PADDING_FLAG   sample                                           2
  * The following save, measured without all uses of one of them at once (the drive's program of tools/fluxtrue bench):

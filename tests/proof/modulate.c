@@ -60,10 +60,18 @@ void proof_duty_is_limited_only_beyond_the_pulse(void)
 void proof_middle_phase(void)
 {
     abc_q29_t x;
-    const int32_t y = middle(x);
+    ASSUME(WITHIN(x.a, -(1 << 30), (1 << 30) - 1) && WITHIN(x.b, -(1 << 30), (1 << 30) - 1) &&
+           WITHIN(x.c, -(1 << 30), (1 << 30) - 1));
+    const int32_t y = plus_middle(0, x) / 2;
     PROVE(y == x.a || y == x.b || y == x.c);
     PROVE((y >= x.a) + (y >= x.b) + (y >= x.c) >= 2);
     PROVE((y <= x.a) + (y <= x.b) + (y <= x.c) >= 2);
+}
+
+/* What a voltage of one axis leaves to the other, by the table. */
+static int32_t left_by(int32_t v)
+{
+    return fx_circle_table[(v ^ (v >> 31)) >> 7];
 }
 
 void proof_voltage_circle(void)
@@ -73,10 +81,12 @@ void proof_voltage_circle(void)
     ASSUME(WITHIN(v.d, -(1 << 30), 1 << 30) && WITHIN(v.q, -(1 << 30), 1 << 30) && IS_Q15(omega));
     const dq_q15_t limited = limit_to_circle(v, error_d, omega);
     PROVE(IS_Q15(limited.d) && IS_Q15(limited.q));
-    PROVE(limited.q <= remaining_voltage(limited.d) && limited.q >= -remaining_voltage(limited.d) - 1);
-    const int32_t left = remaining_voltage(fx_sat_q15_word(v.q));
+    PROVE(limited.q <= left_by(limited.d) && limited.q >= -left_by(limited.d) - 1);
+    const int32_t left = left_by(fx_sat_q15_word(v.q));
     const int32_t d_max = (left > V_D_MIN) ? left : V_D_MIN;
     PROVE(error_d <= 0 || (limited.d <= d_max && limited.d >= -d_max - 1));
+    const int32_t d = fx_sat_q15_word(v.d);
+    PROVE(error_d <= 0 || d > d_max || d < -d_max - 1 || limited.d == d);
     PROVE((v.d >= 0) == (limited.d >= 0));
 }
 
@@ -86,8 +96,7 @@ void proof_voltage_circle_changes_nothing_inside(void)
     int32_t error_d, omega;
     ASSUME(IS_Q15(v.d) && IS_Q15(v.q) && IS_Q15(omega));
     const dq_q15_t limited = limit_to_circle(v, error_d, omega);
-    const bool inside = v.q <= remaining_voltage(v.d) && v.q >= -remaining_voltage(v.d) &&
-                        v.d <= remaining_voltage(v.q) && v.d >= -remaining_voltage(v.q);
+    const bool inside = v.q <= left_by(v.d) && v.q >= -left_by(v.d) && v.d <= left_by(v.q) && v.d >= -left_by(v.q);
     PROVE(!inside || (limited.d == v.d && limited.q == v.q));
 }
 

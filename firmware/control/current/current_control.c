@@ -7,8 +7,10 @@
 #include "fx/q.h"
 
 #define HALF_LSB_Q22 64
-#define V_D_MIN Q15(0.7) /* share of the circle that the d axis may always use (CC-11) */
-#define REACHED_SHIFT 4  /* psi_f/16: what is left of a change is made at once (CC-25) */
+#define V_D_MIN Q15(0.7)                     /* share of the circle that the d axis may always use (CC-11) */
+#define CIRCLE_SHIFT 7                       /* 256 cells of the circle's table */
+#define V_Q_LEAVES_MIN (182 << CIRCLE_SHIFT) /* from the first cell that leaves less than V_D_MIN */
+#define REACHED_SHIFT 4                      /* psi_f/16: what is left of a change is made at once (CC-25) */
 
 /* Two halfwords that lie side by side, by one load. */
 static fx_pair_t pair_of(q15_t low, q15_t high)
@@ -98,16 +100,33 @@ static int32_t reciprocal_v_max(const current_control_config_t *config, int32_t 
     return fx_usat_bits(fx_quotient(config->per_ratio_q31, (uint32_t)v_dc), 22) * 512;
 }
 
-/* Clamps to [-limit - 1, limit]. The magnitude is the ones' complement, so that one comparison is enough. */
-static int32_t clamp_symmetric(int32_t x, int32_t limit)
+/* The magnitude of a negative number is its ones' complement, so that one comparison with a limit is enough. */
+static int32_t ones_magnitude(int32_t x)
 {
-    return fx_min_s32(x ^ (x >> 31), limit) ^ (x >> 31);
+    return x ^ (x >> 31);
 }
 
-/* Largest voltage of one axis inside the unit circle, given the other axis' voltage; at least a quarter (CC-11). */
-static int32_t remaining_voltage(int32_t other)
+static int32_t with_sign_of(int32_t magnitude, int32_t x)
 {
-    return fx_circle_table[(other ^ (other >> 31)) >> 7];
+    return magnitude ^ (x >> 31);
+}
+
+/* Clamps to [-limit - 1, limit]. */
+static int32_t clamp_symmetric(int32_t x, int32_t limit)
+{
+    return with_sign_of(fx_min_s32(ones_magnitude(x), limit), x);
+}
+
+/* Largest voltage of one axis inside the unit circle, given the other's magnitude; at least a quarter (CC-11). */
+static int32_t remaining_voltage(const uint16_t *circle, int32_t other)
+{
+    return circle[other >> CIRCLE_SHIFT];
+}
+
+/* The same, at least V_D_MIN: it is compared as a cell of the table, before the table is read. */
+static int32_t remaining_for_d(const uint16_t *circle, int32_t q)
+{
+    return (q < V_Q_LEAVES_MIN) ? remaining_voltage(circle, q) : V_D_MIN;
 }
 
 /* While the d flux is to fall, the d axis has priority. While it is to rise, d gets what q leaves of the circle: the q
@@ -115,14 +134,17 @@ static int32_t remaining_voltage(int32_t other)
  * What the d axis lacks is subtracted from q: only a smaller q flux gives the d axis its voltage (CC-14). */
 static dq_q15_t limit_to_circle(dq_q15_t v, int32_t error_d, int32_t turn)
 {
-    int32_t d = fx_sat_q15_word(v.d);
+    const uint16_t *circle = fx_circle_table;
+    FX_ADDRESS_ONCE(circle);
+    int32_t magnitude_d = ones_magnitude(fx_sat_q15_word(v.d));
     if (error_d > 0) {
-        d = clamp_symmetric(d, fx_max_s32(remaining_voltage(fx_sat_q15_word(v.q)), V_D_MIN));
+        magnitude_d = fx_min_s32(magnitude_d, remaining_for_d(circle, ones_magnitude(fx_sat_q15_word(v.q))));
     }
+    const int32_t d = with_sign_of(magnitude_d, v.d);
     const int32_t excess = fx_sat_q15_word(v.d - d);
     const int32_t sign = turn >> 31; /* 0 or -1: with two's complement an excess of 0 changes nothing */
     const int32_t q = v.q + (excess ^ sign) - sign;
-    return (dq_q15_t){d, clamp_symmetric(q, remaining_voltage(d))};
+    return (dq_q15_t){d, clamp_symmetric(q, remaining_voltage(circle, magnitude_d))};
 }
 
 /* s += a T_s (u_limited - u), the difference limited to four times the circle (CC-10). Q33 * Q13 = Q30. */
@@ -153,7 +175,7 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     if (FX_USUALLY((uint32_t)fx_dot2(v_pair, v_pair) < config->clear_q30)) {
         return (current_control_out_t){.u = u, .v = v_pair, .clear = true};
     }
-    const dq_q15_t limited = limit_to_circle(v, (int32_t)(error << 16), turn);
+    const dq_q15_t limited = limit_to_circle(v, (int32_t)(error << 16), to->turn);
     const dq_q15_t change = {limited.d - v.d, limited.q - v.q};
     const int32_t gain_q33 = fx_mul_q31_word(config->tracking_gain_q34, in->v_dc); /* per unit of v: Q34 * Q15 */
     const fx_two_words_t next = FX_LOAD_TWO(state, s_d_q30, s_q_q30);

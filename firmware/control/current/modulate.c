@@ -18,21 +18,33 @@ static abc_q29_t phases(const modulate_config_t *config, fx_pair_t v, fx_pair_t 
     return (abc_q29_t){x.a, x.b, x.c};
 }
 
-/* The middle one of the three phase voltages. As they sum to zero, it is minus the sum of the largest and the smallest:
- * half of it, added to all phases, is the zero sequence (MO-4). */
-static int32_t middle(abc_q29_t x)
+static inline FX_INLINED int32_t plus_twice(int32_t level, int32_t x)
+{
+    return fx_in_register(level + 2 * x);
+}
+
+/* level plus twice the middle one of the three phase voltages. As they sum to zero, it is minus the sum of the largest
+ * and the smallest: half of it, added to all phases, is the zero sequence (MO-4). Added in each branch, it needs no
+ * register of its own: one instruction less. */
+static int32_t plus_middle(int32_t level, abc_q29_t x)
 {
     if (x.a < x.b) {
-        return (x.b < x.c) ? x.b : fx_max_s32(x.a, x.c);
+        if (x.b < x.c) {
+            return plus_twice(level, x.b);
+        }
+        return (x.a < x.c) ? level + 2 * x.c : level + 2 * x.a;
     }
-    return (x.a < x.c) ? x.a : fx_max_s32(x.b, x.c);
+    if (x.a < x.c) {
+        return plus_twice(level, x.a);
+    }
+    return (x.b < x.c) ? level + 2 * x.c : level + 2 * x.b;
 }
 
 /* Distance of a phase's duty from one half, Q31. May wrap; adding half a duty then wraps it back. */
 static int32_t phase_q31(int32_t common_q31, int32_t x_q29, int32_t dead_time_q16, int32_t sign)
 {
-    const int32_t level = fx_in_register((int32_t)((uint32_t)common_q31 + (uint32_t)(dead_time_q16 * sign)));
-    return (int32_t)((uint32_t)level + 4U * (uint32_t)x_q29);
+    const int32_t level = fx_in_register((int32_t)((uint32_t)common_q31 + 4U * (uint32_t)x_q29));
+    return (int32_t)((uint32_t)level + (uint32_t)(dead_time_q16 * sign));
 }
 
 /* Q31, distances from one half; middle: half a duty and half an LSB to round it. */
@@ -46,19 +58,20 @@ typedef struct {
 static uint32_t limit_pulse(pulse_limits_t limits, int32_t x_q31, uint32_t *limited)
 {
     const int32_t distance = x_q31 ^ (x_q31 >> 31);
-    if (distance < limits.longest) {
-        return ((uint32_t)x_q31 + (uint32_t)limits.middle) >> 16;
+    int32_t made_q31 = x_q31;
+    if (distance >= limits.longest) {
+        const int32_t possible = fx_in_register((distance < limits.nearer_rail) ? limits.longest : HALF_Q31);
+        *limited = (uint32_t)possible; /* not zero, without another instruction */
+        made_q31 = possible ^ (fx_in_register(x_q31) >> 31);
     }
-    *limited = 1U;
-    const int32_t possible = (distance < limits.nearer_rail) ? limits.longest : HALF_Q31;
-    return ((uint32_t)(possible ^ (fx_in_register(x_q31) >> 31)) + (uint32_t)limits.middle) >> 16;
+    return ((uint32_t)made_q31 + (uint32_t)limits.middle) >> 16;
 }
 
 modulate_out_t modulate_step(const modulate_config_t *config, fx_pair_t v, fx_pair_t i, fx_pair_t advanced)
 {
     const abc_q29_t x = phases(config, v, advanced);
     const abc_q15_t sign = polarity(config, i, advanced);
-    const int32_t shift = 2 * middle(x);
+    const int32_t shift = plus_middle(0, x);
     const int32_t dead_time = config->dead_time_q16;
     const pulse_limits_t limits = {config->longest_q31, config->nearer_rail_q31, fx_in_register(HALF_Q31 + ROUND_Q31)};
     uint32_t limited = 0;
@@ -72,7 +85,7 @@ duty_t modulate_clear(const modulate_config_t *config, fx_pair_t v, fx_pair_t i,
 {
     const abc_q29_t x = phases(config, v, advanced);
     const abc_q15_t sign = polarity(config, i, advanced);
-    const int32_t common = fx_in_register(HALF_Q31 + ROUND_Q31) + 2 * middle(x);
+    const int32_t common = plus_middle(fx_in_register(HALF_Q31 + ROUND_Q31), x);
     const int32_t dead_time = config->dead_time_q16;
     return (duty_t){(uint32_t)phase_q31(common, x.a, dead_time, sign.a) >> 16,
                     (uint32_t)phase_q31(common, x.b, dead_time, sign.b) >> 16,
