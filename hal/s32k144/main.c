@@ -46,8 +46,9 @@ static volatile union {
 } alarms;
 static bool started; /* the PWM, and with it the fast ISR */
 
-/* The gate driver's flag is cleared first and the fault raised afterwards, so that a fault in between is not lost. */
-static void alarms_take(void)
+/* The gate driver's flag is cleared first and the fault raised afterwards, so that a fault in between is not lost.
+ * Not inlined: alarms are rare. */
+static FX_NOT_INLINED FX_COLD void alarms_take(void)
 {
     if (alarms.gate_driver) {
         alarms.gate_driver = false;
@@ -65,27 +66,15 @@ static void alarms_take(void)
     }
 }
 
-static inline FX_INLINED void run_period(void)
-{
-    fast_isr(&ecu.drive);
-    if (angle_fault()) {
-        drive_raise_fault(&ecu.drive, FAULT_ANGLE);
-    }
-}
-
-/* Apart from the handler: without alarms, which are rare, it saves no registers of its own. */
-static FX_NOT_INLINED FX_COLD void after_alarms(void)
-{
-    alarms_take();
-    run_period();
-}
-
+/* With link-time optimisation the period is compiled into the handler. */
 void adc_handler(void)
 {
     if (alarms.any != 0U) {
-        after_alarms();
-    } else {
-        run_period();
+        alarms_take();
+    }
+    fast_isr(&ecu.drive);
+    if (angle_fault()) {
+        drive_raise_fault(&ecu.drive, FAULT_ANGLE);
     }
 }
 
