@@ -5,7 +5,7 @@
 
 /* Of the newest period and the last window, which ends in it or shortly before. Both are read in place: the fast ISR
  * writes their slots again a window later at the earliest. Without the sums of a step the mean voltage is that of the
- * period. */
+ * period. The flux of the last step is that of the torque monitor, which runs after this. */
 static dc_jump_in_t read_inputs(const drive_t *drive)
 {
     const sample_t *sample = sample_box_last(&drive->samples);
@@ -16,7 +16,9 @@ static dc_jump_in_t read_inputs(const drive_t *drive)
         .u = has_sums ? step_mean_of(drive, window->sum_u) : sample->point.u,
         .i = sample->point.i,
         .psi = {sample->point.flux.psi_d, sample->point.flux.psi_q},
+        .psi_last = drive->task.torque_monitor.psi,
         .omega = fx_q15_from_q31(sample->point.omega),
+        .torque = drive->task.torque_commanded,
         .v_dc = (q15_t)sample->v_dc,
     };
 }
@@ -26,10 +28,13 @@ void ecu_check_dc_sensor(ecu_t *ecu)
     drive_t *drive = &ecu->drive;
     const torque_monitor_config_t *monitor = &drive->motor->torque_monitor;
     const dc_jump_config_t config = {
-        .r = monitor->r >> 15, .rate_gain = monitor->rate_gain, .v_0 = monitor->v_0, .t_0 = monitor->t_0};
-    dc_jump_in_t in = read_inputs(drive);
-    in.psi_last = drive->task.torque_monitor.psi;
-    in.torque = drive->task.torque_commanded;
+        .r = monitor->r >> 15,
+        .rate_gain = monitor->rate_gain,
+        .v_0 = monitor->v_0,
+        .t_0 = monitor->t_0,
+        .i_0 = monitor->i_0,
+    };
+    const dc_jump_in_t in = read_inputs(drive);
     if (dc_jump_step(&config, &ecu->dc_jump, &in)) {
         drive->request.faults |= FAULT_INPUT;
     }

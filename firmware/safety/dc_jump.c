@@ -8,8 +8,8 @@ enum { SETTLED = 4, WAIT = 3, FOUND = 8 }; /* steps: before the jump; after it, 
 
 static dq_q15_t rotational_voltage(const dc_jump_config_t *config, const dc_jump_in_t *in)
 {
-    const q15_t psi_d = fx_sat_q15((in->psi.d + in->psi_last.d) / 2);
-    const q15_t psi_q = fx_sat_q15((in->psi.q + in->psi_last.q) / 2);
+    const q15_t psi_d = (q15_t)((in->psi.d + in->psi_last.d) >> 1); /* a mean of two Q15 numbers is one */
+    const q15_t psi_q = (q15_t)((in->psi.q + in->psi_last.q) >> 1);
     return (dq_q15_t){fx_sat_q15(fx_mul_gain_q15(config->r, (q15_t)in->i.d) - fx_mul_q15(in->omega, psi_q)),
                       fx_sat_q15(fx_mul_gain_q15(config->r, (q15_t)in->i.q) + fx_mul_q15(in->omega, psi_d))};
 }
@@ -24,9 +24,18 @@ static q31_t dot_q28(dq_q15_t a, dq_q15_t b)
     return (fx_mul_q30((q15_t)a.d, (q15_t)b.d) >> 2) + (fx_mul_q30((q15_t)a.q, (q15_t)b.q) >> 2);
 }
 
-/* (MN-45); 0: the rotational voltage is too small, or opposed. */
+/* (MN-53) */
+static bool legs_are_known(const dc_jump_config_t *config, dq_q15_t i)
+{
+    return dot_q28(i, i) > fx_mul_q30(config->i_0, config->i_0) >> 2;
+}
+
+/* (MN-45); 0: the rotational voltage is too small, or opposed, or the duties do not determine the voltage. */
 static q15_t half_kappa(const dc_jump_config_t *config, const dc_jump_in_t *in)
 {
+    if (!legs_are_known(config, in->i)) {
+        return 0;
+    }
     const dq_q15_t w = rotational_voltage(config, in);
     const dq_q15_t e = {without_change(config, in->u.d, in->psi.d - in->psi_last.d),
                         without_change(config, in->u.q, in->psi.q - in->psi_last.q)};
@@ -34,7 +43,7 @@ static q15_t half_kappa(const dc_jump_config_t *config, const dc_jump_in_t *in)
     if (squared >> 2 <= fx_mul_q30(config->v_0, config->v_0)) { /* (4 v_0)^2 is 4 v_0^2 in Q28: may not fit 32 bits */
         return 0;
     }
-    return (q15_t)fx_max_s32(fx_div_q31(dot_q28(e, w) / 2, squared) >> 16, 0);
+    return (q15_t)fx_max_s32(fx_div_q31(dot_q28(e, w) >> 1, squared) >> 16, 0);
 }
 
 static bool has_moved(const dc_jump_config_t *config, const dc_jump_state_t *state, const dc_jump_in_t *in)
@@ -70,12 +79,24 @@ static void follow(dc_jump_state_t *state, q15_t v_dc, q15_t kappa)
 }
 
 /* What the jump interrupts must have been steady, and what follows it must be of the sensor. */
-static bool continues(const dc_jump_state_t *state, const dc_jump_in_t *in, q15_t kappa)
+static bool continues(const dc_jump_state_t *state, bool jump, q15_t v_dc, q15_t kappa)
 {
-    if (!is_jump(state, in->v_dc)) {
+    if (!jump) {
         return state->after == 0U;
     }
-    return state->before == (uint8_t)SETTLED && (state->after < (uint8_t)WAIT || is_of_sensor(state, in->v_dc, kappa));
+    return state->before == (uint8_t)SETTLED && (state->after < (uint8_t)WAIT || is_of_sensor(state, v_dc, kappa));
+}
+
+static void compare(dc_jump_state_t *state, const dc_jump_in_t *in, q15_t kappa)
+{
+    const bool jump = is_jump(state, in->v_dc);
+    if (!continues(state, jump, in->v_dc, kappa)) {
+        begin(state, in, kappa);
+    } else if (jump) {
+        state->after = (uint8_t)fx_min_s32((int32_t)state->after + 1, FOUND);
+    } else {
+        follow(state, in->v_dc, kappa);
+    }
 }
 
 bool dc_jump_step(const dc_jump_config_t *config, dc_jump_state_t *state, const dc_jump_in_t *in)
@@ -83,12 +104,10 @@ bool dc_jump_step(const dc_jump_config_t *config, dc_jump_state_t *state, const 
     const q15_t kappa = in->acting ? half_kappa(config, in) : (q15_t)0;
     if (kappa == 0) {
         *state = (dc_jump_state_t){0};
-    } else if (has_moved(config, state, in) || !continues(state, in, kappa)) {
+    } else if (has_moved(config, state, in)) {
         begin(state, in, kappa);
-    } else if (is_jump(state, in->v_dc)) {
-        state->after = (uint8_t)fx_min_s32((int32_t)state->after + 1, FOUND);
     } else {
-        follow(state, in->v_dc, kappa);
+        compare(state, in, kappa);
     }
     return state->after == (uint8_t)FOUND;
 }

@@ -3,12 +3,13 @@
 #define SAFETY_DC_JUMP_H
 /** Finds a dc voltage sensor whose gain jumps: the computed voltage jumps with it, the machine's does not.
  *   w      = j w psi + r i: what the machine's voltage is by speed, tables and currents; e = u - d psi/dt
- *   kappa  = e.w/|w|^2, compared while |w| > 4 v_0
+ *   kappa  = e.w/|w|^2, compared while |w| > 4 v_0 and |i| > i_0: with less current the duties do not determine the
+ *            machine's voltage
  *   jump   |v_dc - v_0dc| > 3/32 v_0dc between two steps; v_0dc, kappa_0: of the last steps before it
  *   sensor |(kappa - kappa_0) v_0dc - (v_dc - v_0dc) kappa_0| < |(v_dc - v_0dc) kappa_0|/2 in the 4th to 8th step
  *   A battery whose voltage jumps leaves kappa as it is. Speed (1/64) and commanded torque (t_0/4) must be steady in
  *   the 4 steps before the jump and in all steps after it, otherwise the comparison begins anew.
- * Source   docs/theory/monitors.md (MN-45) ... (MN-48)
+ * Source   docs/theory/monitors.md (MN-45) ... (MN-48), (MN-53)
  * Units    per unit
  * Range    every argument; saturates
  * Rounding 2^-14 of kappa, three times that of its mean, against a threshold of 0.05
@@ -24,6 +25,7 @@ typedef struct {
     q16_t rate_gain; /* 1/(omega_b task period): flux step to voltage */
     q15_t v_0;       /* voltage error of the inverter */
     q15_t t_0;       /* torque error allowed at no torque */
+    q15_t i_0;       /* current error of noise and of the currents' zero crossings */
 } dc_jump_config_t;
 
 typedef struct {

@@ -312,15 +312,28 @@ void test_the_dc_voltage_sensor_is_compared_only_while_the_bridge_follows_the_to
     }
 }
 
-/* Without current the rotational voltage is half of the flux. */
+/* Without a winding's drop the rotational voltage is half of the flux. */
 void test_the_dc_voltage_sensor_is_compared_above_four_times_the_inverters_voltage_error(void)
 {
+    static motor_t without_drop;
+    without_drop = motor;
+    without_drop.torque_monitor.r = 0;
     compare_point();
-    sample.point.i = (dq_q15_t){0, 0};
+    ecu.drive.motor = &without_drop;
     sample.point.flux.psi_q = 0;
     for (int beyond = 0; beyond < 2; beyond++) {
         sample.point.flux.psi_d = 8 * V_0 + 2 * beyond;
         ecu.drive.task.torque_monitor.psi = (dq_q15_t){sample.point.flux.psi_d, 0};
+        check_dc_sensor();
+        TEST_ASSERT_EQUAL(beyond, ecu.dc_jump.before);
+    }
+}
+
+void test_the_dc_voltage_sensor_is_compared_above_the_motors_error_of_the_currents(void)
+{
+    compare_point();
+    for (int beyond = 0; beyond < 2; beyond++) {
+        sample.point.i = (dq_q15_t){0, motor.torque_monitor.i_0 + 2 * beyond};
         check_dc_sensor();
         TEST_ASSERT_EQUAL(beyond, ecu.dc_jump.before);
     }
@@ -352,6 +365,7 @@ void test_a_dc_voltage_sensor_whose_gain_jumps_is_an_input_fault_in_the_eighth_s
 {
     sample.acting = true;
     sample.point.omega = 1 << 30;
+    sample.point.i.q = 9000;
     sample.point.flux.psi_d = 14000;
     ecu.drive.task.torque_monitor.psi.d = 14000;
     for (int n = 0; n < 6; n++) {
