@@ -281,6 +281,7 @@ void emu_restore(emu_t *emu, const emu_snapshot_t *snapshot)
     emu->s = snapshot->state;
     emu->flash = snapshot->flash;
     emu->error[0] = '\0';
+    emu_upper_ram_update(emu);
 }
 
 void emu_snapshot_free(emu_snapshot_t *snapshot)

@@ -319,6 +319,7 @@ void sim_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t
     enum { CHIPCTL = 0x04 };
     if (offset == CHIPCTL) {
         emu->s.upper_retained = (value & 1U << 20) == 0U;
+        emu_upper_ram_update(emu);
         if ((value & 1U << 21) == 0U) {
             emu_fail(emu, "write of SIM.CHIPCTL: retention of SRAM_L, in which the stack lies, is not modelled");
         }

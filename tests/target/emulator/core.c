@@ -245,26 +245,6 @@ static void it_state_clear(uc_engine *uc)
     }
 }
 
-/* Because this hook exists, unicorn updates the program counter before every access to a peripheral. The message about
- * a refused access can therefore state it exactly. */
-static void on_access(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value, void *user)
-{
-    (void)type, (void)address, (void)size, (void)value, (void)user;
-    it_state_clear(uc);
-}
-
-/* The reference manual forbids every access to RAM whose content is retained. */
-static void on_upper_ram(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value, void *user)
-{
-    (void)type, (void)size, (void)value;
-    it_state_clear(uc);
-    emu_t *emu = user;
-    if (emu->s.upper_retained) {
-        emu_fail(emu, "access to 0x%08x: SIM.CHIPCTL.SRAMU_RETEN keeps this RAM from being accessed",
-                 (uint32_t)address);
-    }
-}
-
 static void on_data(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value, void *user)
 {
     (void)value;
@@ -275,14 +255,42 @@ static void on_data(uc_engine *uc, uc_mem_type type, uint64_t address, int size,
     }
 }
 
-static bool on_unmapped(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value, void *user)
+static bool is_peripheral(uint64_t address)
 {
-    (void)uc, (void)value;
+    return address - MMIO_BASE < MMIO_SIZE || address - PPB_BASE < PPB_SIZE ||
+           address - DATA_FLASH_BASE < DATA_FLASH_SIZE;
+}
+
+/* Called for every access to the peripherals, because unicorn is told that none is permitted: it then updates the
+ * program counter first, so that the message about a refused access can state it exactly. A hook of reads and writes
+ * would do the same, but with any such hook every access to RAM and flash leaves the translated code, too. */
+static bool on_refused(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value, void *user)
+{
+    (void)value;
+    emu_t *emu = user;
     const bool fetch = type == UC_MEM_FETCH_UNMAPPED || type == UC_MEM_FETCH_PROT;
     const bool write = type == UC_MEM_WRITE_UNMAPPED || type == UC_MEM_WRITE_PROT;
+    if (!fetch && is_peripheral(address)) {
+        it_state_clear(uc);
+        return true;
+    }
+    if (emu->s.upper_retained && address - RAM_UPPER < RAM_UPPER_SIZE) {
+        /* The reference manual forbids every access to RAM whose content is retained. */
+        emu_fail(emu, "access to 0x%08x: SIM.CHIPCTL.SRAMU_RETEN keeps this RAM from being accessed",
+                 (uint32_t)address);
+        return false;
+    }
     const char *what = fetch ? "fetch" : write ? "write" : "read";
-    emu_fail(user, "%s of %d bytes at 0x%08x: no memory, or not permitted", what, size, (uint32_t)address);
+    emu_fail(emu, "%s of %d bytes at 0x%08x: no memory, or not permitted", what, size, (uint32_t)address);
     return false;
+}
+
+void emu_upper_ram_update(emu_t *emu)
+{
+    if (emu->upper_closed != emu->s.upper_retained) {
+        emu->upper_closed = emu->s.upper_retained;
+        (void)uc_mem_protect(emu->uc, RAM_UPPER, RAM_UPPER_SIZE, emu->upper_closed ? UC_PROT_NONE : UC_PROT_ALL);
+    }
 }
 
 enum { EXCEPTION_EXIT = 8 };
@@ -416,6 +424,7 @@ void emu_reset(emu_t *emu, uint32_t cause)
     (void)uc_reg_write(emu->uc, UC_ARM_REG_SP, &vector[0]);
     s->pc = vector[1] & ~1U;
     emu_code_changed(emu, RAM_BASE, RAM_SIZE);
+    emu_upper_ram_update(emu);
 }
 
 /* What the RAM holds after the supply has returned is not known. */
@@ -438,31 +447,38 @@ void emu_reset_now(emu_t *emu, uint32_t cause)
 
 /* ---- creation ---- */
 
+static bool peripherals_map(emu_t *emu, uint32_t base, uint32_t size, uc_cb_mmio_read_t read, uc_cb_mmio_write_t write)
+{
+    return uc_mmio_map(emu->uc, base, size, read, emu, write, emu) == UC_ERR_OK &&
+           uc_mem_protect(emu->uc, base, size, UC_PROT_NONE) == UC_ERR_OK;
+}
+
 static bool maps_create(emu_t *emu)
 {
     uc_hook hook;
     uc_engine *uc = emu->uc;
-    void *code = (void *)on_code, *access = (void *)on_access, *data = (void *)on_data;
     const int kind = emu->mode == EMU_COUNTING ? UC_HOOK_CODE : UC_HOOK_BLOCK;
     return uc_mem_map(uc, 0, FLASH_SIZE, UC_PROT_READ | UC_PROT_EXEC) == UC_ERR_OK &&
-           uc_mem_map(uc, RAM_BASE, RAM_SIZE, UC_PROT_ALL) == UC_ERR_OK &&
-           uc_mmio_map(uc, DATA_FLASH_BASE, DATA_FLASH_SIZE, data_flash_read, emu, data_flash_write, emu) ==
-               UC_ERR_OK &&
-           uc_mmio_map(uc, MMIO_BASE, MMIO_SIZE, bus_read, emu, bus_write, emu) == UC_ERR_OK &&
-           uc_mmio_map(uc, PPB_BASE, PPB_SIZE, scs_read, emu, scs_write, emu) == UC_ERR_OK &&
-           uc_hook_add(uc, &hook, kind, code, emu, 1, 0) == UC_ERR_OK &&
-           (emu->mode != EMU_COUNTING ||
-            uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, data, emu, 1, 0) == UC_ERR_OK) &&
+           uc_mem_map(uc, RAM_BASE, RAM_UPPER - RAM_BASE, UC_PROT_ALL) == UC_ERR_OK &&
+           uc_mem_map(uc, RAM_UPPER, RAM_UPPER_SIZE, UC_PROT_ALL) == UC_ERR_OK &&
+           peripherals_map(emu, DATA_FLASH_BASE, DATA_FLASH_SIZE, data_flash_read, data_flash_write) &&
+           peripherals_map(emu, MMIO_BASE, MMIO_SIZE, bus_read, bus_write) &&
+           peripherals_map(emu, PPB_BASE, PPB_SIZE, scs_read, scs_write) &&
+           uc_hook_add(uc, &hook, kind, (void *)on_code, emu, 1, 0) == UC_ERR_OK &&
            uc_hook_add(uc, &hook, UC_HOOK_INTR, (void *)on_exception, emu, 1, 0) == UC_ERR_OK &&
-           uc_hook_add(uc, &hook, UC_HOOK_MEM_INVALID, (void *)on_unmapped, emu, 1, 0) == UC_ERR_OK &&
-           uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, access, emu, DATA_FLASH_BASE,
-                       DATA_FLASH_BASE + DATA_FLASH_SIZE - 1) == UC_ERR_OK &&
-           uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, (void *)on_upper_ram, emu, RAM_UPPER,
-                       RAM_BASE + RAM_SIZE - 1) == UC_ERR_OK &&
-           uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, access, emu, MMIO_BASE,
-                       MMIO_BASE + MMIO_SIZE - 1) == UC_ERR_OK &&
-           uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, access, emu, PPB_BASE,
-                       (uint64_t)PPB_BASE + PPB_SIZE - 1U) == UC_ERR_OK;
+           uc_hook_add(uc, &hook, UC_HOOK_MEM_INVALID, (void *)on_refused, emu, 1, 0) == UC_ERR_OK;
+}
+
+/* What has been translated without the hook would not call it. */
+bool emu_data_watch(emu_t *emu)
+{
+    uc_hook hook;
+    if (!emu->data_watched) {
+        emu->data_watched = uc_hook_add(emu->uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, (void *)on_data, emu, 1,
+                                        0) == UC_ERR_OK &&
+                            uc_ctl_flush_tb(emu->uc) == UC_ERR_OK;
+    }
+    return emu->data_watched;
 }
 
 static const char *program_load(emu_t *emu)

@@ -25,6 +25,7 @@ enum {
     RAM_BASE = 0x1FFF8000,
     RAM_SIZE = 0xF000,
     RAM_UPPER = 0x20000000, /* SRAM_U; below it SRAM_L */
+    RAM_UPPER_SIZE = RAM_BASE + RAM_SIZE - RAM_UPPER,
     FLASH_SIZE = 0x80000,
     CODE_SIZE = FLASH_SIZE + RAM_SIZE, /* memory from which instructions may come */
     DATA_FLASH_SIZE = 0x10000,
@@ -246,6 +247,8 @@ struct emu {
     can_port_t *can_port;
     emu_counts_t counts[VECTORS];
     profile_t *profile; /* NULL: not requested */
+    bool data_watched;  /* on_data() of core.c is called */
+    bool upper_closed;  /* unicorn refuses access to the upper RAM, as s.upper_retained demands */
     char error[ERROR_SIZE];
     data_flash_t flash;
     state_t s;
@@ -278,6 +281,10 @@ void emu_timer(emu_t *emu, timer_t_ timer, uint64_t due);
 uint64_t emu_instant(const emu_t *emu);
 void emu_reset(emu_t *emu, uint32_t cause);
 void emu_core_clock(emu_t *emu, uint32_t ticks_per_cycle);
+/** After every change of s.upper_retained: permits or refuses access to the upper RAM. */
+void emu_upper_ram_update(emu_t *emu);
+/** From now on the profile is told of every access to data, which then takes longer to emulate; false: impossible. */
+bool emu_data_watch(emu_t *emu);
 
 /* bus.c */
 extern const peripheral_t peripherals[];

@@ -28,7 +28,7 @@ struct profile {
 
 bool emu_profile_start(emu_t *emu, const uint8_t *cost, uint32_t half_words, uint32_t taken)
 {
-    if (emu->mode != EMU_COUNTING || half_words > CODE_SIZE / 2) {
+    if (emu->mode != EMU_COUNTING || half_words > CODE_SIZE / 2 || !emu_data_watch(emu)) {
         return false;
     }
     profile_stop(emu);

@@ -12,7 +12,7 @@ from conftest import Program
 from fluxtrue_tools.bench import image
 from fluxtrue_tools.emulate.core import BREAK, Core, EmulationStoppedError
 
-WATCHDOG = 0x20
+WATCHDOG, POWER_ON = 0x20, 0x80
 
 REFUSED = {
     1: "write of SIM.PLATCGC offset 0x40: the register is not modelled",
@@ -68,6 +68,20 @@ def test_the_program_counter_of_a_refused_access_is_exact(library: ctypes.CDLL, 
         (opcode,) = struct.unpack("<H", core.read(pc, 2))
     is_store_word = opcode >> 11 == 0b01100 or opcode >> 4 == 0xF8C  # STR (immediate), T1 or T3
     assert is_store_word
+
+
+def test_ram_that_is_closed_to_keep_its_content_is_open_again_after_a_restored_state_and_after_a_power_on(
+    library: ctypes.CDLL, program: Program
+) -> None:
+    second = "access to 0x20000804: SIM.CHIPCTL"  # the program's first access is that to 0x20000800
+    with Core.of_program(library, program("poke", "-DCASE=29")) as core:
+        start = core.save()
+        for again in (lambda: None, lambda: core.restore(start), lambda: core.reset(POWER_ON)):
+            again()
+            with pytest.raises(EmulationStoppedError):
+                core.run(1e-3)
+            assert second in (core.error or "")
+        core.free(start)
 
 
 @pytest.fixture(scope="module")

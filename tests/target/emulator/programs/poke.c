@@ -127,6 +127,10 @@ __attribute__((used)) void reset(void)
 #elif CASE == 28               /* the oscillator has not started yet */
     REG(0x40064100U) = 1;
     REG(0x40064014U) = 0x01000001U;
+#elif CASE == 29               /* RAM is used, then closed */
+    seen = REG(0x20000800U);
+    REG(0x40048004U) = 0x200000U;
+    seen = REG(0x20000804U);
 #endif
     for (;;) {
     }
