@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 import subprocess
 from pathlib import Path
@@ -12,6 +13,9 @@ from fluxtrue_tools.sim.build import build_lock
 
 ROOT = Path(__file__).resolve().parents[3]
 ARM_CC = "arm-none-eabi-gcc"
+MOTORS = ROOT / "firmware" / "motors"
+PRESETS = ("CMakePresets.json", "CMakeUserPresets.json")
+STAMP = "configured"  # in the build folder: the hash of what the last configuration depended on
 
 
 def image(preset: str, folder: Path, motor: Path | None = None) -> Path:
@@ -23,9 +27,30 @@ def image(preset: str, folder: Path, motor: Path | None = None) -> Path:
     if shutil.which(ARM_CC) is None:
         raise FluxtrueError(f"{ARM_CC} not found: install gcc-arm-none-eabi or run tools/setup")
     with build_lock():
-        _run(["cmake", "--preset", preset, "-B", str(folder), *options], preset)
+        configure(preset, folder, options, motor or MOTORS)
         _run(["cmake", "--build", str(folder), "-j", "2"], preset)
     return folder / "fluxtrue.elf"
+
+
+def configure(preset: str, folder: Path, options: list[str], motors: Path) -> None:
+    """Configure the folder, unless nothing has changed since: it takes seconds, and the build itself repeats it when a
+    file of CMake has changed."""
+    command = ["cmake", "--preset", preset, "-B", str(folder), *options]
+    stamp = folder / STAMP
+    if not stamp.is_file() or stamp.read_text(encoding="utf-8") != _state(command, folder, motors):
+        _run(command, preset)
+        stamp.write_text(_state(command, folder, motors), encoding="utf-8")
+
+
+def _state(command: list[str], folder: Path, motors: Path) -> str:
+    """A hash of the command, the presets, the motors' data and the options that the folder has now."""
+    files = [*(ROOT / name for name in PRESETS), folder / "CMakeCache.txt"]
+    files += sorted(path for kind in ("*.toml", "*.csv") for path in motors.rglob(kind))
+    digest = hashlib.sha256("\0".join([*command, str(ROOT)]).encode())
+    for path in files:
+        content = path.read_bytes() if path.is_file() else b""
+        digest.update(f"\0{path}\0{len(content)}\0".encode() + content)
+    return digest.hexdigest()
 
 
 def _run(command: list[str], preset: str) -> None:
