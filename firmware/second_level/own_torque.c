@@ -5,6 +5,7 @@
 #include "fx/trig.h"
 
 #define SPACING_SHIFT 11 /* a sixteenth */
+#define MEAN_SHARE_MAX Q15(1.0 / 16.0)
 #define LOSS_PART_MAX 5 /* a healthy machine may make a fifth less torque than the table */
 
 typedef struct {
@@ -37,12 +38,23 @@ static int32_t identified_loss(const second_level_constants_t *constants, const 
     return fx_clamp_q31(change, -fx_max_s32(table, 0) / LOSS_PART_MAX, 0);
 }
 
-int32_t second_level_own_torque(const second_level_constants_t *constants, const second_level_sample_t *sample)
+/* The torque that the mean over a period has less than the samples (SL-9). */
+static int32_t mean_loss(const second_level_constants_t *constants, int32_t turn, int32_t i_q, int32_t at_samples)
+{
+    const int32_t turn_q16 = turn >> 16;
+    const int32_t share = fx_mul_gain_q15_word(constants->mean_share, (turn_q16 * turn_q16) >> 16);
+    const int32_t changing = 2 * at_samples - fx_mul_gain_q15_word(constants->mean_flux, i_q);
+    return (fx_min_s32(share, MEAN_SHARE_MAX) * fx_max_s32(changing, 0)) >> 15;
+}
+
+int32_t second_level_own_torque(const second_level_constants_t *constants, const second_level_sample_t *sample,
+                                int32_t turn)
 {
     static const fx_grid_t grid = {-32768, 0, SPACING_SHIFT, SPACING_SHIFT, SECOND_LEVEL_ROWS, SECOND_LEVEL_COLUMNS};
     const current_t i = rotor_current(constants, sample);
     const fx_cell_t cell = fx_cell(&grid, i.d, fx_abs_q31(i.q));
     const int32_t table = fx_cell_interp(constants->torque, SECOND_LEVEL_COLUMNS, cell);
-    const int32_t magnitude = table + identified_loss(constants, sample, i, table);
+    const int32_t at_samples = table + identified_loss(constants, sample, i, table);
+    const int32_t magnitude = at_samples - mean_loss(constants, turn, fx_abs_q31(i.q), at_samples);
     return (i.q < 0) ? -magnitude : magnitude;
 }

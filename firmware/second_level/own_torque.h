@@ -5,11 +5,12 @@
  * own.
  *   i_alpha = (2 i_a - i_b - i_c)/3, i_beta = (i_b - i_c)/sqrt(3), in counts: mid scale cancels
  *   theta_e = p theta_m + offset;  i_d = i_alpha cos + i_beta sin,  i_q = i_beta cos - i_alpha sin
- *   t = sgn(i_q) (table(i_d, |i_q|) + c)
+ *   t = sgn(i_q) (s - theta^2/12 max(2 s - mean_flux |i_q|, 0)),  s = table(i_d, |i_q|) + c
  *   c = psi_d_error |i_q| + lq_error (table - (psi_f + l_d i_d) |i_q|), -table/5 ... 0
  *   c corrects the table by the identified deviation of magnet and q axis: only towards a smaller torque, and at most
- *   as far as a healthy machine may deviate. The torque has the sign of i_q
- * Source   docs/theory/second-level.md (SL-3), (SL-4), (SL-8)
+ *   as far as a healthy machine may deviate. s is the torque at the samples; that of the shaft is the mean over the
+ *   period, in which the field turns by theta; theta^2/12 counts up to a sixteenth. The torque has the sign of i_q
+ * Source   docs/theory/second-level.md (SL-3), (SL-4), (SL-8), (SL-9)
  * Units    per unit of T_b
  * Range    every argument; outside the table its edge
  * Rounding 3 LSB q15, a current 1; the coarse table's error is part of `tolerance`
@@ -25,6 +26,8 @@ typedef struct {
     int32_t lq_error;    /* identified scale of psi_q minus one, q15 */
 } second_level_sample_t;
 
-int32_t second_level_own_torque(const second_level_constants_t *constants, const second_level_sample_t *sample);
+/* turn: change of theta_m in the last step. */
+int32_t second_level_own_torque(const second_level_constants_t *constants, const second_level_sample_t *sample,
+                                int32_t turn);
 
 #endif

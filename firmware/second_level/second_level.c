@@ -36,7 +36,7 @@ bool second_level_step(const second_level_constants_t *constants, second_level_t
         level->confirmed_steps = 0;
         return false;
     }
-    const int32_t torque_q8 = second_level_own_torque(constants, &in->sample) * (1 << MEAN_BITS);
+    const int32_t torque_q8 = second_level_own_torque(constants, &in->sample, turn) * (1 << MEAN_BITS);
     level->mean_q8 += (torque_q8 - level->mean_q8) >> constants->mean_shift;
     level->confirmed_steps = is_excessive(constants, level) ? level->confirmed_steps + 1 : 0;
     pass(level, PASSED_COMPARISON);

@@ -10,6 +10,7 @@
 #define ONE 32768.0
 #define PI 3.14159265358979323846
 #define THIRD (2.0 * PI / 3.0)
+#define PERIODS 5 /* in a step */
 
 static second_level_constants_t constants;
 static second_level_t level;
@@ -31,6 +32,8 @@ void setUp(void)
                                            .beta_per_count = 37837,
                                            .psi_f = 6554,
                                            .l_d = 6554, /* l_q = 0.4 */
+                                           .mean_flux = 52429,
+                                           .mean_share = 38809, /* of 5 periods in a step */
                                            .pole_pairs = 3,
                                            .turn_standstill = 1000,
                                            .mean_shift = 2,
@@ -71,7 +74,8 @@ void test_the_own_torque_is_that_of_the_machine_at_every_angle_and_current(void)
         const double i_d = -0.7 + 0.75 * ((n * 37) % 1000) / 1000.0;
         const double i_q = -0.65 + 1.3 * ((n * 71) % 1000) / 1000.0;
         const second_level_sample_t at = sample(i_d, i_q, ((n * 13) % 628) / 100.0);
-        TEST_ASSERT_INT32_WITHIN(4, (int32_t)lrint(ONE * torque(i_d, i_q)), second_level_own_torque(&constants, &at));
+        TEST_ASSERT_INT32_WITHIN(4, (int32_t)lrint(ONE * torque(i_d, i_q)),
+                                 second_level_own_torque(&constants, &at, 0));
     }
 }
 
@@ -79,7 +83,7 @@ void test_the_offset_of_the_angle_belongs_to_the_electrical_angle(void)
 {
     constants.angle_offset = 500000000U;
     const second_level_sample_t at = sample(-0.3, 0.4, 1.0);
-    TEST_ASSERT_INT32_WITHIN(4, (int32_t)lrint(ONE * torque(-0.3, 0.4)), second_level_own_torque(&constants, &at));
+    TEST_ASSERT_INT32_WITHIN(4, (int32_t)lrint(ONE * torque(-0.3, 0.4)), second_level_own_torque(&constants, &at, 0));
 }
 
 /* The state of the reception while the vehicle requests this torque all the time. */
@@ -149,7 +153,7 @@ static int32_t torque_with(double i_d, double i_q, int32_t psi_d_error, int32_t 
     second_level_sample_t at = sample(i_d, i_q, 1.0);
     at.psi_d_error = psi_d_error;
     at.lq_error = lq_error;
-    return second_level_own_torque(&constants, &at);
+    return second_level_own_torque(&constants, &at, 0);
 }
 
 /* psi_q = 0.4 i_q, psi_d = 0.2 + 0.1 i_d: 10 % less of psi_q are 0.04 i_q |i_d| less torque, in both directions. */
@@ -171,6 +175,73 @@ void test_the_deviations_count_only_as_far_as_a_healthy_machine_can_have_them(vo
     TEST_ASSERT_EQUAL_INT32(table, torque_with(-0.3, 0.5, 3000, 3000));
     TEST_ASSERT_EQUAL_INT32(table - table / 5, torque_with(-0.3, 0.5, -32768, 0));
     TEST_ASSERT_INT32_WITHIN(2, -(table - table / 5), torque_with(-0.3, -0.5, -32768, -32768));
+}
+
+/* The mean over a period of the torque of a machine with psi_f = 0.2, l_d = 0.1, l_q = 0.4, with these currents at
+ * both of its ends: the voltage is constant, so that the flux in the stator's frame moves along a straight line. */
+static double mean_torque(double i_d, double i_q, double theta)
+{
+    enum { PARTS = 2000 };
+    const double psi_d = 0.2 + 0.1 * i_d, psi_q = 0.4 * i_q;
+    double sum = 0.0;
+    for (int n = 0; n < PARTS; n++) {
+        const double s = (n + 0.5) / PARTS, back = -s * theta, on = theta - s * theta;
+        const double d = (1.0 - s) * (psi_d * cos(back) - psi_q * sin(back)) + s * (psi_d * cos(on) - psi_q * sin(on));
+        const double q = (1.0 - s) * (psi_d * sin(back) + psi_q * cos(back)) + s * (psi_d * sin(on) + psi_q * cos(on));
+        sum += d * q / 0.4 - q * (d - 0.2) / 0.1;
+    }
+    return sum / PARTS;
+}
+
+/* The change of the mechanical angle in a step in which the field turns by theta in each period. */
+static int32_t turn_of(double theta)
+{
+    return (int32_t)lrint(PERIODS * theta / 3.0 / (2.0 * PI) * 4294967296.0);
+}
+
+static int32_t turning_torque(double i_d, double i_q, double theta)
+{
+    const second_level_sample_t at = sample(i_d, i_q, 1.0);
+    return second_level_own_torque(&constants, &at, turn_of(theta));
+}
+
+/* What is left out is theta^2/12 of the correction at most, 3 % at 0.6, and the product of what flux and current change
+ * within the period, of the same order. */
+void test_in_field_weakening_the_torque_is_the_mean_over_the_period(void)
+{
+    for (int n = 0; n < 400; n++) {
+        const double theta = -0.6 + 1.2 * ((n * 37) % 400) / 400.0, i_d = -0.9 + 0.15 * ((n * 71) % 100) / 100.0;
+        const double i_q = 0.4 * ((n % 2) ? 1.0 : -1.0), mean = mean_torque(i_d, i_q, theta);
+        const double loss = fabs(torque(i_d, i_q) - mean);
+        TEST_ASSERT_DOUBLE_WITHIN(6.0 + 0.12 * ONE * loss, ONE * mean, turning_torque(i_d, i_q, theta));
+    }
+}
+
+/* Where reluctance makes the mean larger than the samples, the torque at the samples counts. */
+void test_a_turning_field_never_adds_torque(void)
+{
+    TEST_ASSERT_TRUE(mean_torque(-0.1, 0.5, 0.6) > torque(-0.1, 0.5));
+    TEST_ASSERT_EQUAL_INT32(torque_with(-0.1, 0.5, 0, 0), turning_torque(-0.1, 0.5, 0.6));
+    TEST_ASSERT_EQUAL_INT32(torque_with(-0.1, -0.5, 0, 0), turning_torque(-0.1, -0.5, -0.6));
+}
+
+/* What does not change is psi_q psi_f/l_d = 0.32. */
+void test_at_most_a_sixteenth_of_what_changes_is_taken_off(void)
+{
+    const int32_t at_samples = torque_with(-0.9, 0.4, 0, 0);
+    const int32_t most = at_samples - (2 * at_samples - 10486) / 16;
+    TEST_ASSERT_INT32_WITHIN(2, most, turning_torque(-0.9, 0.4, 0.9));
+    const second_level_sample_t at = sample(-0.9, 0.4, 1.0);
+    TEST_ASSERT_INT32_WITHIN(2, most, second_level_own_torque(&constants, &at, INT32_MAX));
+    TEST_ASSERT_INT32_WITHIN(2, most, second_level_own_torque(&constants, &at, INT32_MIN));
+}
+
+void test_the_field_turns_as_the_angle_did_since_the_last_step(void)
+{
+    in.sample = sample(-0.9, 0.4, 1.0);
+    level.theta_m = in.sample.theta_m - (uint32_t)turn_of(0.6);
+    (void)second_level_step(&constants, &level, &in);
+    TEST_ASSERT_EQUAL_INT32(64 * turning_torque(-0.9, 0.4, 0.6), level.mean_q8);
 }
 
 /* Against the direction of i_q: with more reluctance torque than magnet torque, as a table may say at its edge. */
@@ -202,9 +273,9 @@ void test_the_angle_is_rounded_to_the_nearest_of_65536(void)
     constants.pole_pairs = 1;
     second_level_sample_t at = sample(0.6, 0.0, 0.0);
     at.theta_m = 0x7FFFU;
-    TEST_ASSERT_EQUAL_INT32(0, second_level_own_torque(&constants, &at));
+    TEST_ASSERT_EQUAL_INT32(0, second_level_own_torque(&constants, &at, 0));
     at.theta_m = 0x8000U;
-    TEST_ASSERT_EQUAL_INT32(-2, second_level_own_torque(&constants, &at));
+    TEST_ASSERT_EQUAL_INT32(-2, second_level_own_torque(&constants, &at, 0));
 }
 
 /* i_beta = 1000/sqrt(3) = 577.3, of which the cosine of 0 degrees, 32767/32768, leaves 576 after rounding down; the
@@ -215,7 +286,7 @@ void test_a_column_of_the_table_is_a_sixteenth_of_the_current(void)
         constants.torque[n] = (int16_t)(2048 * (n % SECOND_LEVEL_COLUMNS % 16));
     }
     const second_level_sample_t at = {.counts = {32768, 32768 + 500, 32768 - 500}};
-    TEST_ASSERT_EQUAL_INT32(576, second_level_own_torque(&constants, &at));
+    TEST_ASSERT_EQUAL_INT32(576, second_level_own_torque(&constants, &at, 0));
 }
 
 /* The sign of the torque is that of i_q; without i_q the table counts as it is. */
@@ -225,10 +296,10 @@ void test_without_current_across_the_magnet_the_table_counts_as_it_is(void)
         constants.torque[n] = 700;
     }
     second_level_sample_t at = {.counts = {32768, 32768, 32768}};
-    TEST_ASSERT_EQUAL_INT32(700, second_level_own_torque(&constants, &at));
+    TEST_ASSERT_EQUAL_INT32(700, second_level_own_torque(&constants, &at, 0));
     at.counts.i_b -= 1000;
     at.counts.i_c += 1000;
-    TEST_ASSERT_EQUAL_INT32(-700, second_level_own_torque(&constants, &at));
+    TEST_ASSERT_EQUAL_INT32(-700, second_level_own_torque(&constants, &at, 0));
 }
 
 /* i_q = 0.3, with the mean already there: it stays to a count. */
@@ -248,7 +319,7 @@ void test_the_mean_follows_the_torque_with_a_fourth_per_step(void)
 {
     in.sample = sample(0.0, 0.3, 0.0);
     (void)second_level_step(&constants, &level, &in);
-    TEST_ASSERT_EQUAL_INT32(64 * second_level_own_torque(&constants, &in.sample), level.mean_q8);
+    TEST_ASSERT_EQUAL_INT32(64 * second_level_own_torque(&constants, &in.sample, 0), level.mean_q8);
 }
 
 /* 1000 of the request and 1000/64 of the share leave this tolerance. */

@@ -53,7 +53,8 @@ def make_second_level(motor: Motor) -> SecondLevel:
     turns = config.omega_max_rad_s / machine.pole_pairs / (2.0 * np.pi) * bases.step_s
     per_count = 2.0 ** (16 - config.inverter.adc_bits)  # q15 of the full scale, which is I_b
     psi_f_Vs = float(motor.model.psi_d(0.0, 0.0))
-    psi_d_Vs = float(motor.model.psi_d(-bases.current_A / 2.0, 0.0))
+    l_d_H = (psi_f_Vs - float(motor.model.psi_d(-bases.current_A / 2.0, 0.0))) / (bases.current_A / 2.0)
+    l_q_H = float(motor.model.psi_q(0.0, bases.current_A / PARTS)) / (bases.current_A / PARTS)
     words = {
         "torque_per_count": round(float(motor.bus.factors["torque_Nm"]) / bases.torque_Nm * Q15_ONE * Q16_ONE),
         "torque_max": round(rated),
@@ -63,7 +64,9 @@ def make_second_level(motor: Motor) -> SecondLevel:
         "alpha_per_count": round(per_count / 3.0 * Q16_ONE),
         "beta_per_count": round(per_count / np.sqrt(3.0) * Q16_ONE),
         "psi_f": round(psi_f_Vs / bases.flux_Vs * Q15_ONE),
-        "l_d": round((psi_f_Vs - psi_d_Vs) / (bases.current_A / 2.0) / bases.inductance_H * Q16_ONE),
+        "l_d": round(l_d_H / bases.inductance_H * Q16_ONE),
+        "mean_flux": round(psi_f_Vs / bases.flux_Vs * l_q_H / l_d_H * Q16_ONE),
+        "mean_share": round((2.0 * np.pi * machine.pole_pairs / bases.periods_per_step) ** 2 / 24.0 * Q16_ONE),
         "pole_pairs": machine.pole_pairs,
         "angle_offset": 0,
         "turn_standstill": min(round(STANDSTILL_SHARE * turns * 2.0**32), 2**31 - 1),
