@@ -24,7 +24,7 @@ bool capture_config_is_valid(const capture_config_t *config)
 static FX_NOT_INLINED FX_COLD void begin(capture_t *capture, const capture_config_t *config, capture_state_t state)
 {
     const uint16_t number = (uint16_t)(capture->number + 1U);
-    *capture = (capture_t){.config = *config, .state = (uint8_t)state, .number = number};
+    *capture = (capture_t){.config = *config, .state = (uint8_t)state, .number = number, .values = capture->values};
     columns_find(capture);
 }
 
@@ -84,12 +84,11 @@ static uint32_t contiguous(const capture_t *capture, uint32_t newest)
                   (uint32_t)capture->config.samples - capture->at);
 }
 
-static void take(capture_t *capture, int16_t *memory, const capture_source_t *source, const sample_t *next,
-                 uint32_t count)
+static void take(capture_t *capture, int16_t *memory, const sample_t *next, uint32_t count)
 {
     const capture_config_t *config = &capture->config;
     const uint32_t at = capture->at;
-    columns_copy(capture, &memory[(size_t)at * config->signals], next, source->step, count);
+    columns_copy(capture, &memory[(size_t)at * config->signals], next, count);
     capture->next += count * config->divisor;
     capture->at = (uint16_t)((at + count == config->samples) ? 0U : at + count);
 }
@@ -102,15 +101,14 @@ static void count_triggered(capture_t *capture, uint32_t count)
     }
 }
 
-static FX_NOT_INLINED void record(capture_t *capture, int16_t *memory, const capture_source_t *source)
+static FX_NOT_INLINED void record(capture_t *capture, int16_t *memory, const sample_t *slot, uint32_t newest)
 {
     const bool armed = capture->state == CAPTURE_ARMED;
-    const uint32_t readable = contiguous(capture, source->newest);
-    const sample_t *next = &source->slot[capture->next % SAMPLE_SLOTS];
-    const uint32_t count = armed ? trigger_search(capture, next, source->step, readable)
-                                 : lesser(readable, capture->remaining);
+    const uint32_t readable = contiguous(capture, newest);
+    const sample_t *next = &slot[capture->next % SAMPLE_SLOTS];
+    const uint32_t count = armed ? trigger_search(capture, next, readable) : lesser(readable, capture->remaining);
     if (count > 0U) { /* else the trigger is the next sample */
-        take(capture, memory, source, next, count);
+        take(capture, memory, next, count);
     }
     if (!armed) {
         count_triggered(capture, count);
@@ -133,14 +131,14 @@ static FX_NOT_INLINED FX_COLD void skip_lost_periods(capture_t *capture, uint32_
     }
 }
 
-void capture_step(capture_t *capture, int16_t *memory, const capture_source_t *source)
+void capture_step(capture_t *capture, int16_t *memory, const sample_t *slot, uint32_t newest)
 {
-    while ((int32_t)(source->newest - capture->next) >= 0 &&
+    while ((int32_t)(newest - capture->next) >= 0 &&
            (capture->state == CAPTURE_ARMED || capture->state == CAPTURE_TRIGGERED)) {
-        if (source->newest - capture->next >= USABLE) {
-            skip_lost_periods(capture, source->newest);
+        if (newest - capture->next >= USABLE) {
+            skip_lost_periods(capture, newest);
         } else {
-            record(capture, memory, source);
+            record(capture, memory, slot, newest);
         }
     }
 }

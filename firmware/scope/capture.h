@@ -22,7 +22,8 @@ void capture_freeze(capture_t *capture, const capture_config_t *config, uint32_t
 void capture_trigger(capture_t *capture, uint32_t period);
 /** Releases the memory. */
 void capture_stop(capture_t *capture);
-/** Copies the periods that have come since the last step. The memory begins at a word. */
-void capture_step(capture_t *capture, int16_t *memory, const capture_source_t *source);
+/** Copies the periods that have come since the last step. The memory begins at a word. slot: the ring; newest: its
+ * newest period. */
+void capture_step(capture_t *capture, int16_t *memory, const sample_t *slot, uint32_t newest);
 
 #endif

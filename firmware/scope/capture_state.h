@@ -65,6 +65,7 @@ typedef struct {
     uint16_t lost;
     uint32_t trigger_period; /* number of the PWM period of the trigger, since the start */
     /* Not read by tools. */
+    scope_step_values_t values;         /* of the command before the last: those of the periods copied next */
     uint32_t next;                      /* period of the next sample */
     uint32_t asked_for;                 /* period in which a command or a fault triggers */
     int32_t trigger_offset;             /* the trigger is reached where sign * value + offset >= 0 */
@@ -81,11 +82,5 @@ typedef struct {
     bool plain; /* armed, and only a level in the samples of every period is waited for */
     bool ready; /* reaching the level triggers: before an edge, the signal has been on the other side of it */
 } capture_t;
-
-typedef struct {
-    const sample_t *slot; /* the ring */
-    uint32_t newest;      /* its newest period */
-    const scope_step_values_t *step;
-} capture_source_t;
 
 #endif

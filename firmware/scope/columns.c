@@ -48,11 +48,11 @@ void columns_find(capture_t *capture)
     capture->uses_step = capture->of_step != 0U || capture->trigger_place >= FROM_STEP;
 }
 
-column_t column_of_trigger(const capture_t *capture, const sample_t *next, const scope_step_values_t *step)
+column_t column_of_trigger(const capture_t *capture, const sample_t *next)
 {
     const uint8_t place = capture->trigger_place;
     if (place >= FROM_STEP) {
-        return (column_t){(const uint8_t *)step + (place - FROM_STEP), 0};
+        return (column_t){(const uint8_t *)&capture->values + (place - FROM_STEP), 0};
     }
     return (column_t){(const uint8_t *)next + place, stride_of(capture)};
 }
@@ -150,13 +150,12 @@ static FX_NOT_INLINED void copy_rows(const capture_t *capture, int16_t *to, cons
 }
 
 /* Writes the step's values, which are constant during the step, over what the rows contain in their places. */
-static FX_NOT_INLINED void fill_step(const capture_t *capture, int16_t *to, const scope_step_values_t *step,
-                                     uint32_t count)
+static FX_NOT_INLINED void fill_step(const capture_t *capture, int16_t *to, uint32_t count)
 {
     const uint32_t signals = capture->config.signals;
     for (uint32_t k = 0; k < signals; k++) {
         if ((capture->of_step & 1U << k) != 0U) {
-            const int16_t value = value_at((const uint8_t *)step + capture->place[k]);
+            const int16_t value = value_at((const uint8_t *)&capture->values + capture->place[k]);
             for (uint32_t n = 0; n < count; n++) {
                 to[n * signals + k] = value;
             }
@@ -164,8 +163,7 @@ static FX_NOT_INLINED void fill_step(const capture_t *capture, int16_t *to, cons
     }
 }
 
-void columns_copy(const capture_t *capture, int16_t *to, const sample_t *next, const scope_step_values_t *step,
-                  uint32_t count)
+void columns_copy(const capture_t *capture, int16_t *to, const sample_t *next, uint32_t count)
 {
     if (capture->usual) {
         copy_usual(to, next, count);
@@ -173,6 +171,6 @@ void columns_copy(const capture_t *capture, int16_t *to, const sample_t *next, c
     }
     copy_rows(capture, to, (const uint8_t *)next, count);
     if (capture->of_step != 0U) {
-        fill_step(capture, to, step, count);
+        fill_step(capture, to, count);
     }
 }

@@ -33,10 +33,9 @@ static inline uint32_t lesser(uint32_t a, uint32_t b)
 /** The places of the signals: once, when a capture begins. */
 void columns_find(capture_t *capture);
 /** The trigger's signal. */
-column_t column_of_trigger(const capture_t *capture, const sample_t *next, const scope_step_values_t *step);
+column_t column_of_trigger(const capture_t *capture, const sample_t *next);
 /** Copies `count` samples, at least one, of all captured signals, from the next period on. The samples must be
  * contiguous in the ring. */
-void columns_copy(const capture_t *capture, int16_t *to, const sample_t *next, const scope_step_values_t *step,
-                  uint32_t count);
+void columns_copy(const capture_t *capture, int16_t *to, const sample_t *next, uint32_t count);
 
 #endif

@@ -75,7 +75,7 @@ static scope_result_t arm(scope_t *scope, const drive_t *drive)
         return SCOPE_OUT_OF_RANGE;
     }
     capture_arm(&scope->capture, &scope->setup, drive->samples.generation);
-    scope->values = step_values(drive);
+    scope->capture.values = step_values(drive);
     return SCOPE_OK;
 }
 
@@ -154,9 +154,8 @@ FX_NOT_INLINED void scope_record(scope_t *scope, const drive_t *drive, bool faul
     if (fault != scope->fault) {
         follow_fault(scope, fault, (drive->fast.faults != 0U) ? drive->fast.fault_period : newest, newest);
     }
-    const capture_source_t source = {drive->samples.slot, newest, &scope->values};
-    capture_step(&scope->capture, scope->memory, &source);
+    capture_step(&scope->capture, scope->memory, drive->samples.slot, newest);
     if (scope->capture.uses_step) {
-        scope->values = step_values(drive);
+        scope->capture.values = step_values(drive);
     }
 }

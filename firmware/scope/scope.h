@@ -33,10 +33,9 @@ typedef enum {
 typedef enum { SCOPE_OK, SCOPE_UNKNOWN, SCOPE_TOO_SHORT, SCOPE_OUT_OF_RANGE, SCOPE_BUSY, SCOPE_RESULTS } scope_result_t;
 
 typedef struct {
-    capture_t capture;          /* first: what tools read begins here */
-    capture_config_t setup;     /* as the commands have left it; acts when it is armed */
-    scope_step_values_t values; /* of the command before the last */
-    bool fault;                 /* in the last step */
+    capture_t capture;      /* first: what tools read begins here */
+    capture_config_t setup; /* as the commands have left it; acts when it is armed */
+    bool fault;             /* in the last step */
     FX_WORD_ALIGNED int16_t memory[CAPTURE_MEMORY];
 } scope_t;
 

@@ -124,20 +124,19 @@ static bool is_plain(const capture_t *capture)
 }
 
 /* Not inlined: the usual search needs fewer registers. */
-static FX_NOT_INLINED uint32_t search_any(capture_t *capture, const sample_t *next, const scope_step_values_t *step,
-                                          uint32_t count)
+static FX_NOT_INLINED uint32_t search_any(capture_t *capture, const sample_t *next, uint32_t count)
 {
-    const condition_t reached = condition(capture, column_of_trigger(capture, next, step));
+    const condition_t reached = condition(capture, column_of_trigger(capture, next));
     const uint32_t until = until_trigger(capture, &reached, count);
     capture->filled = (uint16_t)lesser(capture->filled + until, capture->config.samples);
     capture->plain = is_plain(capture);
     return until;
 }
 
-uint32_t trigger_search(capture_t *capture, const sample_t *next, const scope_step_values_t *step, uint32_t count)
+uint32_t trigger_search(capture_t *capture, const sample_t *next, uint32_t count)
 {
     if (!capture->plain) {
-        return search_any(capture, next, step, count);
+        return search_any(capture, next, count);
     }
     const column_t values = {(const uint8_t *)next + capture->trigger_place, sizeof(sample_t)};
     const condition_t reached = condition(capture, values);

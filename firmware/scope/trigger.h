@@ -13,6 +13,6 @@
 void trigger_reset(capture_t *capture);
 /** The samples before the trigger, from the next period on; `count` if it is not among as many. The search begins when
  * enough samples lie before it; a command or a fault is not kept waiting. */
-uint32_t trigger_search(capture_t *capture, const sample_t *next, const scope_step_values_t *step, uint32_t count);
+uint32_t trigger_search(capture_t *capture, const sample_t *next, uint32_t count);
 
 #endif

@@ -11,7 +11,6 @@
 #define NEVER 30000
 
 static sample_t ring[SAMPLE_SLOTS];
-static scope_step_values_t values;
 static _Alignas(int32_t) int16_t memory[CAPTURE_MEMORY];
 static int16_t written[PERIODS]; /* i_q of each period */
 static uint32_t newest, offset;  /* of the periods' numbers */
@@ -49,8 +48,7 @@ static void run(uint32_t periods)
 
 static void step(void)
 {
-    const capture_source_t source = {ring, offset + newest, &values};
-    capture_step(&capture, memory, &source);
+    capture_step(&capture, memory, ring, offset + newest);
 }
 
 static void run_steps(uint32_t steps)
@@ -109,7 +107,7 @@ void setUp(void)
 {
     memset(&capture, 0, sizeof capture);
     newest = offset = 0;
-    values = (scope_step_values_t){.i_d_ref = 1, .i_q_ref = 2, .torque_commanded = 3, .psi_error = 4};
+    capture.values = (scope_step_values_t){.i_d_ref = 1, .i_q_ref = 2, .torque_commanded = 3, .psi_error = 4};
     config = (capture_config_t){
         .signals = 2,
         .signal = {CAPTURE_i_q_A, CAPTURE_i_d_A},
@@ -501,7 +499,7 @@ void test_a_value_of_the_step_changes_with_the_step(void)
     config.trigger_signal = CAPTURE_i_q_ref_A;
     arm_for(TRIGGER_RISING, 7);
     run_steps(5);
-    values.i_q_ref = 7;
+    capture.values.i_q_ref = 7;
     run_steps(12);
     TEST_ASSERT_EQUAL(CAPTURE_DONE, capture.state);
     TEST_ASSERT_EQUAL_UINT32(3 + 50 + 1, trigger_period());
