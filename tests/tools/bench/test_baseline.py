@@ -77,7 +77,7 @@ def test_the_tick_meets_its_bound_on_average_and_the_peers_stand_beside_the_one_
     tick, with_tables, tables = (stages[name] for name in ("current_tick", "current_tick_tables", "flux_table"))
     assert page.BOUNDS["current_tick"] == (160, 214)
     assert tick[1] <= 160
-    assert tick[2] <= 223  # the bound of 214 is missed since (CC-14) acts in both directions: docs/decisions/026
+    assert tick[2] <= 214
     assert with_tables[1] > tick[1] + tables[1] / 2
     peers = baseline.PAGE.read_text(encoding="utf-8").split("## Comparison with other projects")[1]
     ours = next(line for line in peers.splitlines() if "current control with its flux tables" in line)
