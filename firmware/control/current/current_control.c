@@ -9,7 +9,7 @@
 #define HALF_LSB_Q22 64
 #define V_D_MIN Q15(0.7)                     /* share of the circle that the d axis may always use (CC-11) */
 #define CIRCLE_SHIFT 7                       /* 256 cells of the circle's table */
-#define V_Q_LEAVES_MIN (182 << CIRCLE_SHIFT) /* from the first cell that leaves less than V_D_MIN */
+#define V_Q_LEAVES_MIN (182 * 128) /* from the first cell that leaves less than V_D_MIN */
 #define REACHED_SHIFT 4                      /* psi_f/16: what is left of a change is made at once (CC-25) */
 
 /* Two halfwords that lie side by side, by one load. */
