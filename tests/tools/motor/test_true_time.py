@@ -131,7 +131,7 @@ COUNTS = {
     "PER_STEP": "share of an update", "STEP_CLOCK_NOMINAL_NS": "of the clock itself",
     "STEP_1MS": "a step that is exactly 1 ms", "STEP_DC": "of a temperature",
     "APART_STEPS": "steps, as hal/s32k144/README.md says",
-    "CYCLE_STEPS": "steps, as that page says", "RETAINED_STEPS": "steps, as docs/theory/safe-state.md says",
+    "TEMPERATURE_CYCLE_STEPS": "steps, as that page says", "RETAINED_STEPS": "steps, as docs/theory/safe-state.md says",
     "AWAIT_LOOPS": "loops before there is a task",
     "COMMAND_LOOPS": "loops of the background, longer than any flash command",
     "MEMORY_HOLD_STEPS": "steps in which a save waits for the drive, as firmware/storage/memory.h says",
