@@ -474,9 +474,11 @@ bool emu_data_watch(emu_t *emu)
 {
     uc_hook hook;
     if (!emu->data_watched) {
+        // NOLINTBEGIN(clang-analyzer-optin.core.EnumCastOutOfRange): Unicorn's flags are made to be combined
         emu->data_watched = uc_hook_add(emu->uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, (void *)on_data, emu, 1,
                                         0) == UC_ERR_OK &&
                             uc_ctl_flush_tb(emu->uc) == UC_ERR_OK;
+        // NOLINTEND(clang-analyzer-optin.core.EnumCastOutOfRange)
     }
     return emu->data_watched;
 }
