@@ -28,8 +28,8 @@ typedef struct {
     q16_t alpha_per_count, beta_per_count; /* current of a count of (2 i_a - i_b - i_c) and of (i_b - i_c) */
     int32_t psi_f;                         /* nominal magnet */
     q16_t l_d;                             /* change of psi_d with i_d, without i_q */
-    q16_t mean_flux;                       /* psi_f l_q/l_d, with the largest l_q */
-    q16_t mean_share; /* (2 pi p)^2/(24 N^2): of the turns in a step, squared, to theta^2/12 (SL-9) */
+    q16_t mean_flux;                       /* psi_f l_q/l_d, with the l_q of small currents */
+    q16_t mean_share; /* (2 pi p/N)^2/24: times the squared turns of a step (q16) it is theta^2/12 (q15) (SL-9) */
     uint32_t pole_pairs;
     uint32_t angle_offset;   /* electrical, 2^32 = one turn */
     int32_t turn_standstill; /* change of the mechanical angle in one step, 2^32 = one turn: below it the direction of

@@ -39,7 +39,7 @@ static int32_t identified_loss(const second_level_constants_t *constants, const 
 }
 
 /* The torque that the mean over a period has less than the samples (SL-9). */
-static int32_t mean_loss(const second_level_constants_t *constants, int32_t turn, int32_t i_q, int32_t at_samples)
+static int32_t mean_loss(const second_level_constants_t *constants, int32_t turn, q15_t i_q, int32_t at_samples)
 {
     const int32_t turn_q16 = turn >> 16;
     const int32_t share = fx_mul_gain_q15_word(constants->mean_share, (turn_q16 * turn_q16) >> 16);
@@ -55,6 +55,6 @@ int32_t second_level_own_torque(const second_level_constants_t *constants, const
     const fx_cell_t cell = fx_cell(&grid, i.d, fx_abs_q31(i.q));
     const int32_t table = fx_cell_interp(constants->torque, SECOND_LEVEL_COLUMNS, cell);
     const int32_t at_samples = table + identified_loss(constants, sample, i, table);
-    const int32_t magnitude = at_samples - mean_loss(constants, turn, fx_abs_q31(i.q), at_samples);
+    const int32_t magnitude = at_samples - mean_loss(constants, turn, fx_sat_q15(fx_abs_q31(i.q)), at_samples);
     return (i.q < 0) ? -magnitude : magnitude;
 }

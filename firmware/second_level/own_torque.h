@@ -7,6 +7,7 @@
  *   theta_e = p theta_m + offset;  i_d = i_alpha cos + i_beta sin,  i_q = i_beta cos - i_alpha sin
  *   t = sgn(i_q) (s - theta^2/12 max(2 s - mean_flux |i_q|, 0)),  s = table(i_d, |i_q|) + c
  *   c = psi_d_error |i_q| + lq_error (table - (psi_f + l_d i_d) |i_q|), -table/5 ... 0
+ *   mean_flux = psi_f l_q/l_d
  *   c corrects the table by the identified deviation of magnet and q axis: only towards a smaller torque, and at most
  *   as far as a healthy machine may deviate. s is the torque at the samples; that of the shaft is the mean over the
  *   period, in which the field turns by theta; theta^2/12 counts up to a sixteenth. The torque has the sign of i_q
