@@ -3,6 +3,8 @@
 #include "drive/step_mean.h"
 #include "ecu/ecu_private.h"
 
+#define I_UNDETERMINED Q15(0.02) /* of the full scale of the current: below it two legs may carry none (MN-53) */
+
 /* Of the newest period and the last window, which ends in it or shortly before. Both are read in place: the fast ISR
  * writes their slots again a window later at the earliest. Without the sums of a step the mean voltage is that of the
  * period. The flux of the last step is that of the torque monitor, which runs after this. */
@@ -32,7 +34,7 @@ void ecu_check_dc_sensor(ecu_t *ecu)
         .rate_gain = monitor->rate_gain,
         .v_0 = monitor->v_0,
         .t_0 = monitor->t_0,
-        .i_0 = monitor->i_0,
+        .i_0 = (q15_t)fx_max_s32(monitor->i_0, I_UNDETERMINED),
     };
     const dc_jump_in_t in = read_inputs(drive);
     if (dc_jump_step(&config, &ecu->dc_jump, &in)) {

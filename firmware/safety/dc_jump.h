@@ -25,7 +25,7 @@ typedef struct {
     q16_t rate_gain; /* 1/(omega_b task period): flux step to voltage */
     q15_t v_0;       /* voltage error of the inverter */
     q15_t t_0;       /* torque error allowed at no torque */
-    q15_t i_0;       /* current error of noise and of the currents' zero crossings */
+    q15_t i_0;       /* with less current two legs may be near their zero crossings */
 } dc_jump_config_t;
 
 typedef struct {

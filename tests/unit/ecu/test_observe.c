@@ -339,6 +339,21 @@ void test_the_dc_voltage_sensor_is_compared_above_the_motors_error_of_the_curren
     }
 }
 
+/* (MN-53): two percent of the full scale, where that is far above the largest current. */
+void test_the_dc_voltage_sensor_is_compared_only_where_one_leg_at_most_may_carry_no_current(void)
+{
+    static motor_t of_small_currents;
+    of_small_currents = motor;
+    of_small_currents.torque_monitor.i_0 = 100;
+    compare_point();
+    ecu.drive.motor = &of_small_currents;
+    for (int beyond = 0; beyond < 2; beyond++) {
+        sample.point.i = (dq_q15_t){0, Q15(0.02) + 2 * beyond};
+        check_dc_sensor();
+        TEST_ASSERT_EQUAL(beyond, ecu.dc_jump.before);
+    }
+}
+
 void test_the_dc_voltage_sensor_is_compared_while_the_commanded_torque_is_steady(void)
 {
     static const uint8_t steady[] = {1, 2, 3, 1};
