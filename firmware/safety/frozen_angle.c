@@ -47,14 +47,15 @@ static bool update_mean(const frozen_angle_config_t *config, frozen_angle_state_
     const int shift = (state->standing < MOVING_STEPS) ? 0 : MEAN_SHIFT;
     state->mean_q8.d = mean_step(state->mean_q8.d, u_sum.d * 256, shift);
     state->mean_q8.q = mean_step(state->mean_q8.q, u_sum.q * 256, shift);
-    if (state->standing < config->settle_steps) {
+    const bool settled = state->standing >= config->settle_steps;
+    if (settled) {
+        state->first_q8.d = mean_step(state->first_q8.d, state->mean_q8.d, FIRST_SHIFT);
+        state->first_q8.q = mean_step(state->first_q8.q, state->mean_q8.q, FIRST_SHIFT);
+    } else {
         state->standing++;
         state->first_q8 = state->mean_q8;
-        return false;
     }
-    state->first_q8.d = mean_step(state->first_q8.d, state->mean_q8.d, FIRST_SHIFT);
-    state->first_q8.q = mean_step(state->first_q8.q, state->mean_q8.q, FIRST_SHIFT);
-    return true;
+    return settled;
 }
 
 /* (MN-23) */

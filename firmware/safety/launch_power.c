@@ -68,7 +68,7 @@ static void update_noise(const launch_power_config_t *config, launch_power_state
 static bool update_means(const launch_power_config_t *config, launch_power_state_t *state, const launch_power_in_t *in)
 {
     const bool moved = has_moved(config, state, in);
-    const int32_t omega = moved ? 0 : fx_mulhi((int32_t)(in->theta_e - state->theta_e), config->turn_gain);
+    const int32_t omega = fx_mulhi((int32_t)(in->theta_e - state->theta_e), config->turn_gain);
     state->theta_e = in->theta_e;
     if (moved || in->behind) {
         state->i_ref = (dq_q15_halfword_t){(q15_t)in->i_ref.d, (q15_t)in->i_ref.q};
@@ -86,14 +86,14 @@ static bool update_means(const launch_power_config_t *config, launch_power_state
     if (state->steady < config->settle_steps + EARLY_STEPS) {
         state->steady++;
     }
-    if (!settled) {
+    if (settled) {
+        state->first_power_q8 = mean_step(state->first_power_q8, state->power_q8, first);
+        state->first_omega_q8 = mean_step(state->first_omega_q8, state->omega_q8, first);
+    } else {
         state->first_power_q8 = state->power_q8;
         state->first_omega_q8 = state->omega_q8;
-        return false;
     }
-    state->first_power_q8 = mean_step(state->first_power_q8, state->power_q8, first);
-    state->first_omega_q8 = mean_step(state->first_omega_q8, state->omega_q8, first);
-    return true;
+    return settled;
 }
 
 /* What noise may change m - m_0 by: the variances of both means add up. Halves, which are q15; 2 sqrt(2) in Q7. */

@@ -61,7 +61,7 @@ static uint32_t lost_phases(const plausibility_config_t *config, plausibility_st
 
 /* Square of the distance of a deviation from its own mean over 8 steps, Q30. Each axis of the deviation is limited to
  * e_max. */
-static uint32_t distance_from_mean(dq_q15_t *mean_x8, dq_q15_t i, dq_q15_t i_ref, int32_t e_max)
+static uint32_t squared_distance_from_mean(dq_q15_t *mean_x8, dq_q15_t i, dq_q15_t i_ref, int32_t e_max)
 {
     const int32_t d = fx_clamp_q31(i.d - i_ref.d, -e_max, e_max), q = fx_clamp_q31(i.q - i_ref.q, -e_max, e_max);
     const dq_q15_t ripple = {d - (mean_x8->d >> 3), q - (mean_x8->q >> 3)};
@@ -76,8 +76,8 @@ static uint32_t oscillation(const plausibility_config_t *config, plausibility_st
                             const plausibility_in_t *in)
 {
     const int32_t e_max = config->ripple_max * 4;
-    const uint32_t of_sample = distance_from_mean(&state->sample_x8, in->i, state->expected, e_max);
-    const uint32_t of_step = distance_from_mean(&state->step_x8, in->i_mean, state->expected, e_max);
+    const uint32_t of_sample = squared_distance_from_mean(&state->sample_x8, in->i, state->expected, e_max);
+    const uint32_t of_step = squared_distance_from_mean(&state->step_x8, in->i_mean, state->expected, e_max);
     const int32_t larger = fx_sqrt_q30((of_sample > of_step) ? of_sample : of_step);
     state->ripple_x16 += larger - (state->ripple_x16 >> 4);
     const bool bad = (state->ripple_x16 >> 4) > config->ripple_max;

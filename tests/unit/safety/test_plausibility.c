@@ -219,6 +219,20 @@ void test_the_reference_counts_at_once_where_current_control_answers_at_once(voi
     }
 }
 
+/* 640^2 + 800^2 = 1024^2 + 1024, whose root rounds to 1024. */
+void test_a_deviation_counts_from_the_rounded_limit_on(void)
+{
+    plausibility_config_t strict = config;
+    strict.e_0 = 1024;
+    strict.deviation_steps = 5;
+    for (int32_t beyond = 0; beyond <= 1; beyond++) {
+        setUp();
+        in.i_ref = in.i_mean = (dq_q15_t){0, 0};
+        in.i = (dq_q15_t){640, 800 + beyond};
+        TEST_ASSERT_EQUAL_HEX32(beyond ? FAULT_CONTROL : 0U, plausibility_step(&strict, &state, &in) & FAULT_CONTROL);
+    }
+}
+
 void test_a_phase_without_current_is_found_within_20_ms_whichever_it_is(void)
 {
     for (int x = 0; x < 3; x++) {
