@@ -9,7 +9,7 @@
 #define HALF_LSB_Q22 64
 #define V_D_MIN Q15(0.7)                     /* share of the circle that the d axis may always use (CC-11) */
 #define CIRCLE_SHIFT 7                       /* 256 cells of the circle's table */
-#define V_Q_LEAVES_MIN (182 * 128) /* from the first cell that leaves less than V_D_MIN */
+#define V_Q_LEAVES_MIN (182 * 128)           /* from here on, q15, the circle's cells leave d less than V_D_MIN */
 #define REACHED_SHIFT 4                      /* psi_f/16: what is left of a change is made at once (CC-25) */
 
 /* Two halfwords that lie side by side, by one load. */
@@ -123,7 +123,8 @@ static int32_t remaining_voltage(const uint16_t *circle, int32_t other)
     return circle[other >> CIRCLE_SHIFT];
 }
 
-/* The same, at least V_D_MIN: it is compared as a cell of the table, before the table is read. */
+/* The same for the d axis, at least V_D_MIN. The q voltage is compared with the first cell that leaves less, which
+ * saves reading the table there. */
 static int32_t remaining_for_d(const uint16_t *circle, int32_t q)
 {
     return (q < V_Q_LEAVES_MIN) ? remaining_voltage(circle, q) : V_D_MIN;

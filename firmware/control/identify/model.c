@@ -66,11 +66,13 @@ static void jacobian_rows(const identify_config_t *config, const identify_point_
     per_sigma(config, &m->now.q);
 }
 
-/* What nothing below writes and somebody reads: clearing the whole model would take eight times as long. */
+/* What is read without being written below: clearing the whole model would write 38 words in place of four. */
 static void clear_constants(identify_model_t *m)
 {
-    m->psi_d.h_q30[IDENTIFY_FLUX] = m->psi_q.h_q30[IDENTIFY_FLUX] = 0;
-    m->psi_d.h_q30[IDENTIFY_LQ] = m->psi_q.h_q30[IDENTIFY_LD] = 0;
+    m->psi_d.h_q30[IDENTIFY_FLUX] = 0;
+    m->psi_q.h_q30[IDENTIFY_FLUX] = 0;
+    m->psi_d.h_q30[IDENTIFY_LQ] = 0;
+    m->psi_q.h_q30[IDENTIFY_LD] = 0;
 }
 
 void identify_model(const identify_config_t *config, const identify_point_t *point, const identify_tables_t *tables,
@@ -83,7 +85,8 @@ void identify_model(const identify_config_t *config, const identify_point_t *poi
 
 void identify_torque_row(const identify_config_t *config, const identify_model_t *m, jacobian_row_t *row)
 {
-    row->h_q30[IDENTIFY_R] = row->h_q30[IDENTIFY_DROP] = 0;
+    row->h_q30[IDENTIFY_R] = 0;
+    row->h_q30[IDENTIFY_DROP] = 0;
     for (unsigned j = IDENTIFY_FIRST_OF_FLUX; j < IDENTIFY_STATES; j++) {
         row->h_q30[j] = identify_mul(m->psi_d.h_q30[j], m->i_m.q) - identify_mul(m->psi_q.h_q30[j], m->i_m.d);
     }

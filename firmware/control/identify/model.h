@@ -38,7 +38,8 @@ typedef struct {
     dq_q30_t i_m;
     dq_q30_t iron_i; /* change of i_m with the scale of the iron loss */
     bool current;    /* the current is large enough to define the direction of the voltage drop */
-    /* Change of psi with each state from IDENTIFY_FIRST_OF_FLUX on; 0 for the magnet's flux, for which it is 1. */
+    /* Change of psi with each state from IDENTIFY_FIRST_OF_FLUX on. The entry of the magnet's flux is 0: its change, 1,
+     * is added where it is used. */
     jacobian_row_t psi_d, psi_q;
 } identify_model_t;
 
