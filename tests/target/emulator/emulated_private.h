@@ -13,10 +13,11 @@ typedef struct {
     double period_ticks;
     uint64_t steps;
     double inverter_C, processor_C;
-    double known_share;  /* what the converters read of the bandgap; 1: right */
-    bool board;          /* the image's outputs control contactor, precharge, discharge and gate-driver supply */
-    fluxtrue_t *shadow;  /* NULL: there is none */
-    drive_t task_result; /* result of the shadow's task, while the image's task still runs */
+    double known_share; /* what the converters read of the bandgap; 1: right */
+    bool board;         /* the image's outputs control contactor, precharge, discharge and gate-driver supply */
+    fluxtrue_t *shadow; /* NULL: there is none */
+    uint32_t temperature_steps_at; /* of hal/s32k144/temperature.c, in the image */
+    drive_t task_result;           /* result of the shadow's task, while the image's task still runs */
     bool task_runs;
     uint32_t reset_cause; /* of a reset that is to come in the next period, 0: none */
     double reset_share;   /* of that period */

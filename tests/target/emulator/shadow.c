@@ -16,7 +16,6 @@
 
 enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69, TASK_VECTOR = 16 + 48, GATE_VECTOR = 16 + 103 };
 #define PWM_TICK_S (1.0 / 112e6)
-#define TEMPERATURE_STEPS "temperature_steps" /* of hal/s32k144/temperature.c */
 enum { ENCODER_SHIFT = 18, CAPTURED = 0x80 };
 
 /* Computes the angle as hal/s32k144/angle_quadrature.c and angle_resolver.c do, from the values that they have read. An
@@ -87,7 +86,7 @@ void temperatures_take(const emulated_t *e, fluxtrue_t *host)
 static void temperatures_in_turn_take(const emulated_t *e, fluxtrue_t *host)
 {
     uint32_t steps = 0;
-    (void)emu_read(e->emu, emu_symbol(e->emu, TEMPERATURE_STEPS), &steps, sizeof steps);
+    (void)emu_read(e->emu, e->temperature_steps_at, &steps, sizeof steps);
     const uint32_t turn = steps % TEMPERATURE_CYCLE_STEPS;
     if (turn == TEMPERATURE_WINDING_TURN || host->board.winding_broken) {
         winding_take(e, host);
@@ -183,7 +182,8 @@ bool shadow_start(emulated_t *e)
     if (e->shadow == NULL) {
         e->shadow = fluxtrue_create();
     }
-    if (e->shadow == NULL || emu_symbol(e->emu, TEMPERATURE_STEPS) == 0U) {
+    e->temperature_steps_at = emu_symbol(e->emu, "temperature_steps");
+    if (e->shadow == NULL || e->temperature_steps_at == 0U) {
         return false;
     }
     mirror_pull(&e->mirror);
