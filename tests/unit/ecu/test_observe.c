@@ -219,13 +219,19 @@ void test_the_machine_is_not_slow_while_a_gate_fault_needs_contactor_and_supply(
     TEST_ASSERT_TRUE(slow_at(0.0));
 }
 
+/* The drive's motor with values of its own, which the caller changes. */
+static motor_t *changed_motor(void)
+{
+    static motor_t changed;
+    changed = motor;
+    ecu.drive.motor = &changed;
+    return &changed;
+}
+
 /* Of 480 V, 60 V are an eighth, 4096 counts exactly. */
 void test_at_60_V_the_dc_link_is_not_safe_to_touch_and_the_machine_not_slow(void)
 {
-    static motor_t other;
-    other = motor;
-    other.bases.voltage_V = 480.0F;
-    ecu.drive.motor = &other;
+    changed_motor()->bases.voltage_V = 480.0F;
     for (int below = 0; below < 2; below++) {
         sample.v_dc = 4096 - below;
         ecu.drive.task.safe_state.line_emf = (q15_t)(4096 - below);
@@ -237,13 +243,11 @@ void test_at_60_V_the_dc_link_is_not_safe_to_touch_and_the_machine_not_slow(void
 /* A drive for a low voltage never reaches 60 V. Its limit is 0.8 of the lowest dc voltage at which it runs: 20 V. */
 void test_at_a_low_dc_voltage_the_machine_is_slow_below_what_could_charge_the_link(void)
 {
-    static motor_t low;
-    low = motor;
-    low.monitor.v_min = (int32_t)(20.0 / (double)motor.bases.voltage_V * 32768.0);
-    ecu.drive.motor = &low;
+    motor_t *low = changed_motor();
+    low->monitor.v_min = (int32_t)(20.0 / (double)motor.bases.voltage_V * 32768.0);
     TEST_ASSERT_TRUE(slow_at(15.9));
     TEST_ASSERT_FALSE(slow_at(16.1));
-    low.monitor.v_min = 1000;
+    low->monitor.v_min = 1000;
     ecu.drive.task.safe_state.line_emf = 800;
     TEST_ASSERT_FALSE(observe()->slow);
     ecu.drive.task.safe_state.line_emf = 799;
@@ -315,11 +319,8 @@ void test_the_dc_voltage_sensor_is_compared_only_while_the_bridge_follows_the_to
 /* Without a winding's drop the rotational voltage is half of the flux. */
 void test_the_dc_voltage_sensor_is_compared_above_four_times_the_inverters_voltage_error(void)
 {
-    static motor_t without_drop;
-    without_drop = motor;
-    without_drop.torque_monitor.r = 0;
     compare_point();
-    ecu.drive.motor = &without_drop;
+    changed_motor()->torque_monitor.r = 0;
     sample.point.flux.psi_q = 0;
     for (int beyond = 0; beyond < 2; beyond++) {
         sample.point.flux.psi_d = 8 * V_0 + 2 * beyond;
@@ -329,29 +330,27 @@ void test_the_dc_voltage_sensor_is_compared_above_four_times_the_inverters_volta
     }
 }
 
-void test_the_dc_voltage_sensor_is_compared_above_the_motors_error_of_the_currents(void)
+static void check_compared_above(int32_t current)
 {
-    compare_point();
     for (int beyond = 0; beyond < 2; beyond++) {
-        sample.point.i = (dq_q15_t){0, motor.torque_monitor.i_0 + 2 * beyond};
+        sample.point.i = (dq_q15_t){0, current + 2 * beyond};
         check_dc_sensor();
         TEST_ASSERT_EQUAL(beyond, ecu.dc_jump.before);
     }
 }
 
+void test_the_dc_voltage_sensor_is_compared_above_the_motors_error_of_the_currents(void)
+{
+    compare_point();
+    check_compared_above(motor.torque_monitor.i_0);
+}
+
 /* (MN-53): two percent of the full scale, where that is far above the largest current. */
 void test_the_dc_voltage_sensor_is_compared_only_where_one_leg_at_most_may_carry_no_current(void)
 {
-    static motor_t of_small_currents;
-    of_small_currents = motor;
-    of_small_currents.torque_monitor.i_0 = 100;
     compare_point();
-    ecu.drive.motor = &of_small_currents;
-    for (int beyond = 0; beyond < 2; beyond++) {
-        sample.point.i = (dq_q15_t){0, Q15(0.02) + 2 * beyond};
-        check_dc_sensor();
-        TEST_ASSERT_EQUAL(beyond, ecu.dc_jump.before);
-    }
+    changed_motor()->torque_monitor.i_0 = 100;
+    check_compared_above(Q15(0.02));
 }
 
 void test_the_dc_voltage_sensor_is_compared_while_the_commanded_torque_is_steady(void)
