@@ -232,8 +232,9 @@ static void on_code(uc_engine *uc, uint64_t address, uint32_t size, void *user)
     emu->s.now += (uint64_t)block.count * (emu->s.core_ticks * EMU_HALF_CYCLES_PER_INSTRUCTION / 2U);
 }
 
-/* Every hook of accesses begins with this. Before it calls one, unicorn writes the state of the IT block that contains
- * the access to the processor's state, and never takes it back: what follows the block would be conditional, too. */
+/* on_data() and, for peripherals, on_refused() call this. Before it calls one, unicorn writes the state of the IT block
+ * that contains the access to the processor's state, and never takes it back: what follows the block would be
+ * conditional, too. */
 static void it_state_clear(uc_engine *uc)
 {
     enum { IT_BITS = 0x0600FC00 };
@@ -288,8 +289,13 @@ static bool on_refused(uc_engine *uc, uc_mem_type type, uint64_t address, int si
 void emu_upper_ram_update(emu_t *emu)
 {
     if (emu->upper_closed != emu->s.upper_retained) {
+        const uc_err code = uc_mem_protect(emu->uc, RAM_UPPER, RAM_UPPER_SIZE,
+                                           emu->s.upper_retained ? UC_PROT_NONE : UC_PROT_ALL);
+        if (code != UC_ERR_OK) {
+            emu_fail(emu, "access to the upper RAM cannot be changed: %s", uc_strerror(code));
+            return;
+        }
         emu->upper_closed = emu->s.upper_retained;
-        (void)uc_mem_protect(emu->uc, RAM_UPPER, RAM_UPPER_SIZE, emu->upper_closed ? UC_PROT_NONE : UC_PROT_ALL);
     }
 }
 
@@ -430,9 +436,9 @@ void emu_reset(emu_t *emu, uint32_t cause)
 /* What the RAM holds after the supply has returned is not known. */
 void emu_power_cycle(emu_t *emu)
 {
+    emu->error[0] = '\0';
     emu_reset(emu, 0);
     ram_lose(emu, RAM_BASE, RAM_BASE + RAM_SIZE);
-    emu->error[0] = '\0';
 }
 
 void emu_reset_now(emu_t *emu, uint32_t cause)
@@ -469,18 +475,16 @@ static bool maps_create(emu_t *emu)
            uc_hook_add(uc, &hook, UC_HOOK_MEM_INVALID, (void *)on_refused, emu, 1, 0) == UC_ERR_OK;
 }
 
-/* What has been translated without the hook would not call it. */
+/* What has been translated without the hook would not call it. If the flush fails, the next call repeats the flush and
+ * does not add the hook a second time. */
 bool emu_data_watch(emu_t *emu)
 {
     uc_hook hook;
-    if (!emu->data_watched) {
-        // NOLINTBEGIN(clang-analyzer-optin.core.EnumCastOutOfRange): Unicorn's flags are made to be combined
-        emu->data_watched = uc_hook_add(emu->uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, (void *)on_data, emu, 1,
-                                        0) == UC_ERR_OK &&
-                            uc_ctl_flush_tb(emu->uc) == UC_ERR_OK;
-        // NOLINTEND(clang-analyzer-optin.core.EnumCastOutOfRange)
-    }
-    return emu->data_watched;
+    // NOLINTBEGIN(clang-analyzer-optin.core.EnumCastOutOfRange): Unicorn's flags are made to be combined
+    emu->data_watched = emu->data_watched || uc_hook_add(emu->uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE,
+                                                         (void *)on_data, emu, 1, 0) == UC_ERR_OK;
+    return emu->data_watched && uc_ctl_flush_tb(emu->uc) == UC_ERR_OK;
+    // NOLINTEND(clang-analyzer-optin.core.EnumCastOutOfRange)
 }
 
 static const char *program_load(emu_t *emu)

@@ -29,6 +29,9 @@ static const char *layout_read(mirror_t *mirror, const char *path)
         if (image_layout[i][1] != mirror->part[i].size) {
             return "the sizes of the drive's data differ between target and host";
         }
+        if (i < mirror->inputs && image_layout[i][0] % sizeof(uint32_t) != 0U) {
+            return "an input of the drive does not begin at a word of the target's memory";
+        }
     }
     return NULL;
 }
@@ -101,16 +104,39 @@ int mirror_set(mirror_t *mirror, const char *name, double value)
     return code;
 }
 
-/* Writes the bytes that were set. The others are the image's: what was copied while an activity ran is old by now, and
- * may have been half written. */
+/* Size of the unit that is compared and written as a whole. A unit smaller than a member could mix two values of it; a
+ * unit with several members would write back an old value of those that the image has changed meanwhile. The image
+ * writes to words of the parameters and of their complements, and to members of the request that are alone in a word.
+ * With the bus it also writes the limits, which are half words, and enable, a byte that shares even its half word with
+ * a flag that is set from here. */
+static uint32_t unit_at(uint32_t offset, uint32_t rest)
+{
+    if (offset >= offsetof(drive_t, request.enable) && offset < offsetof(drive_t, request.faults)) {
+        return sizeof(uint8_t);
+    }
+    const bool half = offset >= offsetof(drive_t, request.limits) && offset < offsetof(drive_t, request.enable);
+    return half || rest < sizeof(uint32_t) ? sizeof(uint16_t) : sizeof(uint32_t);
+}
+
+_Static_assert(sizeof(bool) == 1 && sizeof(identification_mode_t) == 1, "the flags of the request are bytes");
+_Static_assert(offsetof(drive_t, request.enable) % sizeof(uint32_t) == 0U, "the flags begin at a word");
+_Static_assert(offsetof(drive_t, request.limits) % sizeof(uint32_t) == 0U, "the limits begin at a word");
+#define EVEN(part) \
+    _Static_assert(sizeof(((drive_t *)0)->part) % sizeof(uint16_t) == 0U, "no single byte at the end of a part");
+LAYOUT_INPUTS(EVEN)
+
+/* Writes what was set. The rest is the image's: what was copied while an activity ran is old by now, and may have been
+ * half written. */
 static void part_push(mirror_t *mirror, int i)
 {
     const mirror_part_t *part = &mirror->part[i];
     const uint8_t *wanted = host_address(mirror, mirror->host, i);
     const uint8_t *found = (const uint8_t *)&mirror->found + part->host_offset;
-    for (uint32_t at = 0; at < part->size; at++) {
-        if (wanted[at] != found[at]) {
-            (void)emu_write(mirror->emu, mirror->base + part->image_offset + at, &wanted[at], 1);
+    uint32_t size;
+    for (uint32_t at = 0; at < part->size; at += size) {
+        size = unit_at(part->host_offset + at, part->size - at);
+        if (memcmp(&wanted[at], &found[at], size) != 0) {
+            (void)emu_write(mirror->emu, mirror->base + part->image_offset + at, &wanted[at], size);
         }
     }
 }

@@ -14,9 +14,16 @@ from fluxtrue_tools.emulate.core import Core
 from fluxtrue_tools.emulate.preempt import TASK
 from fluxtrue_tools.sim.library import Loop
 
-MODULATE, COMPLEMENTS, FIRST = 1, 2, 4  # parts of layout.h; FIRST: the first of the parameters
+REQUEST, MODULATE, COMPLEMENTS, FIRST = 0, 1, 2, 4  # parts of layout.h; FIRST: the first of the parameters
 DEAD_TIME = 16  # offset in modulate_config_t
+LIMITS, ENABLE = 12, 20  # offsets in request_t
 INSIDE = 1000  # instructions of the task
+
+
+def address(core: Core, parts: Parts, part: int) -> int:
+    """Where a part of the drive lies in the image's memory."""
+    offset: int = struct.unpack_from("<I", parts.layout.read_bytes(), 8 * part)[0]
+    return core.symbol("ecu") + offset
 
 
 class DeadTime:
@@ -24,10 +31,9 @@ class DeadTime:
 
     def __init__(self, core: Core, parts: Parts) -> None:
         self._core = core
-        offsets = [offset for offset, _ in struct.iter_unpack("<2I", parts.layout.read_bytes())]
-        base = core.symbol("ecu")
-        self._live = base + offsets[MODULATE] + DEAD_TIME
-        self._complement = self._live + offsets[COMPLEMENTS] - offsets[FIRST]
+        places = [address(core, parts, part) for part in range(FIRST + 1)]
+        self._live = places[MODULATE] + DEAD_TIME
+        self._complement = self._live + places[COMPLEMENTS] - places[FIRST]
         assert self.words == (self.words[0], ~self.words[0])
 
     @property
@@ -106,3 +112,45 @@ def test_what_is_set_before_and_while_the_task_runs_reaches_the_image(drive: Loo
     assert core.outputs == 0x3F
     assert drive.get("truth.torque_Nm") == pytest.approx(0, abs=3)
     assert drive.get("fault_word") == 0
+
+
+@pytest.mark.parametrize(
+    ("found", "by_the_image", "wanted"),
+    [(0x00FE, 0x0100, 0x00FC), (2, -2, 4)],
+    ids=["bytes", "half words"],
+)
+def test_a_word_that_both_have_changed_is_not_mixed(
+    drive: Loop, parts: Parts, found: int, by_the_image: int, wanted: int
+) -> None:
+    """The host's values differ in a part of the word only, the image's in more."""
+    core = Stand(drive).core
+    dead_time = DeadTime(core, parts)
+    nominal = dead_time.words[0]
+    run_into_task(drive, core)
+    dead_time.write(found)
+    dead_time.accept(found)
+    drive.set("dead_time_compensation", wanted / nominal)
+    dead_time.write(by_the_image)
+    dead_time.accept(by_the_image)
+    drive.run(300)
+    assert dead_time.words == (wanted, ~wanted)
+    assert drive.get("fault_word") == 0
+
+
+def test_members_that_share_a_word_with_one_that_is_set_stay(drive: Loop, parts: Parts) -> None:
+    """An image with the bus writes the limits and the first of the flags itself."""
+    core = Stand(drive).core
+    request = address(core, parts, REQUEST)
+    drive.set("torque_requested_Nm", 30)
+    drive.run(300)
+    run_into_task(drive, core)
+    drive.set("current_mode", 1)
+    drive.set("torque_limit_drive_Nm", 50)
+    core.write(request + ENABLE, b"\0")
+    core.write(request + LIMITS + 2, struct.pack("<h", 1234))  # torque_regen
+    drive.run(30)
+    assert core.read(request + ENABLE, 1) == b"\0"
+    assert core.outputs == 0
+    assert struct.unpack("<h", core.read(request + LIMITS + 2, 2)) == (1234,)
+    assert drive.get("torque_limit_drive_Nm") == pytest.approx(50, abs=0.1)
+    assert drive.get("current_mode") == 1
