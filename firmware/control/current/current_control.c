@@ -130,15 +130,16 @@ static int32_t remaining_for_d(const uint16_t *circle, int32_t q)
     return (q < V_Q_LEAVES_MIN) ? remaining_voltage(circle, q) : V_D_MIN;
 }
 
-/* While the d flux is to fall, the d axis has priority. While it is to rise, d gets what q leaves of the circle: the q
- * flux may be what limits the d axis. It keeps 0.7, or else the d flux would fall further and i_d would grow (CC-11).
- * What the d axis lacks is subtracted from q: only a smaller q flux gives the d axis its voltage (CC-14). */
+/* The d axis has priority while its flux is to fall and its voltage is negative, because a smaller voltage would let
+ * the flux rise. Otherwise d gets what q leaves of the circle: the q flux may be what limits the d axis. It keeps 0.7,
+ * or else the d flux would fall further and i_d would grow (CC-11). What the d axis lacks is subtracted from q: only a
+ * smaller q flux gives the d axis its voltage (CC-14). error_d: only the sign acts. */
 static dq_q15_t limit_to_circle(dq_q15_t v, int32_t error_d, int32_t turn)
 {
     const uint16_t *circle = fx_circle_table;
     FX_ADDRESS_ONCE(circle);
     int32_t magnitude_d = ones_magnitude(fx_sat_q15_word(v.d));
-    if (error_d > 0) {
+    if ((v.d & error_d) >= 0) {
         magnitude_d = fx_min_s32(magnitude_d, remaining_for_d(circle, ones_magnitude(fx_sat_q15_word(v.q))));
     }
     const int32_t d = with_sign_of(magnitude_d, v.d);

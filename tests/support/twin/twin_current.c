@@ -19,12 +19,13 @@ static double remaining_voltage(double x)
     return fmax(sqrt(1.0 - end * end), 0.25);
 }
 
-/* The voltage circle. While the d flux must fall, the d axis has priority; while it must rise, d gets what the q axis
+/* The voltage circle. While the d flux must fall and v_d is negative, the d axis has priority; otherwise d gets what q
  * leaves, at least 0.7 of the radius. What d lacks is subtracted from q, which gets the rest. */
-static twin_dq_t circle(twin_dq_t u, double u_max, bool more_flux, double omega)
+static twin_dq_t circle(twin_dq_t u, double u_max, bool less_flux, double omega)
 {
     const twin_dq_t v = {u.d / u_max, u.q / u_max};
-    const double d_max = more_flux ? fmax(remaining_voltage(twin_clamp(v.q, -1.0, 1.0)), 0.7) : 1.0;
+    const bool d_first = less_flux && v.d < 0.0;
+    const double d_max = d_first ? 1.0 : fmax(remaining_voltage(twin_clamp(v.q, -1.0, 1.0)), 0.7);
     const double d = twin_clamp(v.d, -d_max, d_max);
     const double missing = twin_clamp(v.d - d, -1.0, 1.0);
     const double left = remaining_voltage(d);
@@ -81,7 +82,7 @@ twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *st
     const double ud = sigma * (to->weighted.d - f->psi_d) + state->s.d - to->turn * f->psi_q;
     const double uq = sigma * (to->weighted.q - f->psi_q) + state->s.q + to->turn * f->psi_d;
     const twin_dq_t e = {to->psi.d - f->psi_d, to->psi.q - f->psi_q};
-    const twin_dq_t u = circle((twin_dq_t){ud, uq}, motor->v_ratio * in->v_dc, e.d > 0.0, in->omega);
+    const twin_dq_t u = circle((twin_dq_t){ud, uq}, motor->v_ratio * in->v_dc, e.d < 0.0, in->omega);
     const double rounding = 1e-9 * motor->v_base_V;
     state->limited = fabs(u.d - ud) > rounding || fabs(u.q - uq) > rounding;
     const double max = 4.0 * motor->v_ratio * in->v_dc;
@@ -121,7 +122,7 @@ twin_dq_t twin_turning_control(const motor_si_t *motor, twin_turning_state_t *st
     const twin_dq_t flux = sum(model, motor->turning_feedback, fed_back);
     state->unlimited = sum(sum(state->s, 1.0 / motor->period_s, flux), motor->r_ohm_20, in->i);
     const double max = motor->v_ratio * c->v_dc;
-    const twin_dq_t u = circle(state->unlimited, max, c->target.psi.d > c->flux->psi_d, c->omega);
+    const twin_dq_t u = circle(state->unlimited, max, c->target.psi.d < c->flux->psi_d, c->omega);
     const twin_dq_t cut = {twin_clamp(u.d - state->unlimited.d, -4.0 * max, 4.0 * max),
                            twin_clamp(u.q - state->unlimited.q, -4.0 * max, 4.0 * max)};
     const double rounding = 1e-9 * motor->v_base_V;
