@@ -26,12 +26,12 @@ static current_t rotor_current(const second_level_constants_t *constants, const 
                        (fx_mul_q30(beta, at.cos) - fx_mul_q30(alpha, at.sin)) >> 15};
 }
 
-/* The torque by which the identified deviations of magnet and q axis reduce that of the table (SL-8). */
+/* The torque by which the identified deviations of magnet and q axis reduce that of the table (SL-8). i_q: its
+ * magnitude. */
 static int32_t identified_loss(const second_level_constants_t *constants, const second_level_sample_t *sample,
-                               current_t i, int32_t table)
+                               int32_t i_d, q15_t i_q, int32_t table)
 {
-    const q15_t i_q = fx_sat_q15(fx_abs_q31(i.q));
-    const q15_t psi_d = fx_sat_q15(constants->psi_f + fx_mul_gain_q31(constants->l_d, i.d));
+    const q15_t psi_d = fx_sat_q15(constants->psi_f + fx_mul_gain_q31(constants->l_d, i_d));
     const q15_t q_axis = fx_sat_q15(table - fx_mul_q15(psi_d, i_q));
     const int32_t change = fx_mul_q15(fx_sat_q15(sample->psi_d_error), i_q) +
                            fx_mul_q15(fx_sat_q15(sample->lq_error), q_axis);
@@ -52,9 +52,11 @@ int32_t second_level_own_torque(const second_level_constants_t *constants, const
 {
     static const fx_grid_t grid = {-32768, 0, SPACING_SHIFT, SPACING_SHIFT, SECOND_LEVEL_ROWS, SECOND_LEVEL_COLUMNS};
     const current_t i = rotor_current(constants, sample);
-    const fx_cell_t cell = fx_cell(&grid, i.d, fx_abs_q31(i.q));
+    const int32_t q = fx_abs_q31(i.q);
+    const q15_t i_q = fx_sat_q15(q);
+    const fx_cell_t cell = fx_cell(&grid, i.d, q);
     const int32_t table = fx_cell_interp(constants->torque, SECOND_LEVEL_COLUMNS, cell);
-    const int32_t at_samples = table + identified_loss(constants, sample, i, table);
-    const int32_t magnitude = at_samples - mean_loss(constants, turn, fx_sat_q15(fx_abs_q31(i.q)), at_samples);
+    const int32_t at_samples = table + identified_loss(constants, sample, i.d, i_q, table);
+    const int32_t magnitude = at_samples - mean_loss(constants, turn, i_q, at_samples);
     return (i.q < 0) ? -magnitude : magnitude;
 }
