@@ -30,6 +30,7 @@ static bool decide(const motor_t *m, safe_state_state_t *state, const before_res
         .speed_valid = true,
     };
     state->short_circuit = true;
+    state->rectifies = true;
     return safe_state_step(&m->safe_state, state, &in);
 }
 

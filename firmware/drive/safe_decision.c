@@ -18,7 +18,7 @@ static gate_fault_in_t gate_fault_inputs(const drive_t *drive, const snapshot_t 
     return (gate_fault_in_t){
         .latched = (snapshot->faults & FAULT_GATE) != 0U,
         .gates = snapshot->gates,
-        .rectifies = safe->short_circuit,
+        .rectifies = safe->rectifies,
         .currents_valid = currents_valid(drive, snapshot),
         .line_emf = safe->line_emf,
         .v_dc = (q15_t)snapshot->sample.v_dc,

@@ -23,7 +23,7 @@ static int32_t short_circuit_i_d(const drive_t *drive, const snapshot_t *snapsho
 static bool controls_at_speed(const drive_t *drive, run_state_t wanted)
 {
     const task_state_t *task = &drive->task;
-    return task->run_state == RUN_STATE_RUN && wanted != RUN_STATE_FAULT && task->safe_state.short_circuit &&
+    return task->run_state == RUN_STATE_RUN && wanted != RUN_STATE_FAULT && task->safe_state.rectifies &&
            !drive_bypasses_torque_path(drive);
 }
 
@@ -33,7 +33,8 @@ run_state_t switch_off_step(drive_t *drive, const snapshot_t *snapshot, run_stat
     switch_off_t *off = &task->switch_off;
     const bool controls = controls_at_speed(drive, wanted);
     off->holds = controls && wanted == RUN_STATE_OFF && *faults == 0U; /* (SS-12) */
-    const bool moves = controls && *faults != 0U && (*faults & ~FAULTS_CONTROLLED) == 0U;
+    const bool shorts = controls && task->safe_state.short_circuit;
+    const bool moves = shorts && *faults != 0U && (*faults & ~FAULTS_CONTROLLED) == 0U;
     if (!moves || off->steps == STEPS) {
         off->steps = 0;
         return off->holds ? RUN_STATE_RUN : wanted;

@@ -73,7 +73,7 @@ static void receive(ecu_t *ecu)
  * circuit that the speed needs. In the first step the speed is not known yet. */
 static bool needs_hardware(const ecu_t *ecu, const state_outputs_t *on)
 {
-    const bool may_rectify = !ecu->liveness.started || ecu->drive.task.safe_state.short_circuit;
+    const bool may_rectify = !ecu->liveness.started || ecu->drive.task.safe_state.rectifies;
     return (ecu->supervisor.faults & ECU_FAULT_STALL) != 0U || (may_rectify && !on->gate_driver);
 }
 

@@ -60,7 +60,7 @@ static bool is_dc_settled(ecu_t *ecu, int32_t v_dc)
 /* Above this speed the line back-EMF may drive currents through the diodes into the dc link. */
 static bool may_rectify(const drive_t *drive, const sample_t *sample)
 {
-    return drive->task.safe_state.short_circuit && sample->v_dc >= drive->motor->monitor.v_min;
+    return drive->task.safe_state.rectifies && sample->v_dc >= drive->motor->monitor.v_min;
 }
 
 /* With switching disabled there is no current below the speed at which the diodes conduct; while the bridge switches,

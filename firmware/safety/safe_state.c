@@ -74,17 +74,24 @@ static void follow_voltage(safe_state_state_t *state, const safe_state_in_t *in)
     }
 }
 
+/* (SS-2), with the upper level of one decision: whether the back-EMF exceeds it, or the lower one if it did before or
+ * the speed is not valid. */
+static bool exceeds(const safe_state_config_t *config, const safe_state_state_t *state, q16_t upper, bool lower_level)
+{
+    const q16_t share = lower_level ? upper - (config->share_short - config->share_open) : upper;
+    return state->line_emf > fx_mul_gain_q15_word(share, state->v_dc);
+}
+
 bool safe_state_step(const safe_state_config_t *config, safe_state_state_t *state, const safe_state_in_t *in)
 {
     follow_speed(config, state, in);
     follow_voltage(state, in);
     const q15_t psi = fx_sat_q15(config->psi_f + fx_max_s32(in->psi_d_error, 0));
     state->line_emf = fx_mul_gain_q15(Q16(2.0 * SQRT3_HALF), fx_mul_q15(state->speed, psi));
-    const bool lower_level = state->short_circuit || !in->speed_valid;
-    const q15_t share = lower_level ? config->share_open : config->share_short;
-    const bool rectifies = state->line_emf > fx_mul_q15(share, state->v_dc);
-    state->short_circuit = rectifies;
+    const q16_t conducting = fx_min_s32(config->share_short, Q16(1.0));
+    state->rectifies = exceeds(config, state, conducting, state->rectifies || !in->speed_valid);
+    state->short_circuit = exceeds(config, state, config->share_short, state->short_circuit || !in->speed_valid);
     const bool low = in->over_voltage && in->v_dc <= config->v_release;
     const bool released = debounce_holds(&state->low, low, RELEASE_STEPS);
-    return rectifies || (in->over_voltage && !released);
+    return state->short_circuit || (in->over_voltage && !released);
 }

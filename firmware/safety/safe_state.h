@@ -6,6 +6,8 @@
  *   e > share_short v_dc: short circuit, because the diodes could otherwise rectify the back-EMF into the battery and
  *   brake; e < share_open v_dc: switching disabled; between both levels the last decision holds; without a valid speed
  *   share_open is the only one
+ *   The diodes may conduct by the same levels, the upper one being v_dc at most: above v_dc they do, in short pulses
+ *   that brake less than the short circuit.
  *   v_dc is the known dc voltage. It rises with the measured one and falls with a time constant of 64 steps. While a
  *   fault is latched or the converters' reference reads wrong, it falls only if a current has flowed for 10 steps
  *   although switching is disabled: a failed sensor reads as an empty dc link does, but only the empty link draws a
@@ -29,16 +31,17 @@
 #include "types/frames.h"
 
 typedef struct {
+    q16_t share_short, share_open; /* of v_dc, up to 1.06 */
     q15_t psi_f;
-    q15_t share_short, share_open; /* of v_dc */
-    q15_t v_release;               /* an over-voltage has ended below this */
+    q15_t v_release; /* an over-voltage has ended below this */
 } safe_state_config_t;
 
 typedef struct {
-    q15_t speed;    /* known: the measured one, or the last valid one, which falls at a limited rate */
-    q15_t line_emf; /* at the known speed */
-    q15_t v_dc;     /* known */
-    bool short_circuit;
+    q15_t speed;        /* known: the measured one, or the last valid one, which falls at a limited rate */
+    q15_t line_emf;     /* at the known speed */
+    q15_t v_dc;         /* known */
+    bool short_circuit; /* by the back-EMF */
+    bool rectifies;     /* the diodes of an intact bridge may conduct with switching disabled */
     uint8_t rectifying; /* steps in which a current flowed with switching disabled; saturates */
     uint8_t low; /* steps in which v_dc was below v_release in a short circuit after an over-voltage; saturates */
     uint8_t steady, without_current; /* steps in which the short circuit's currents were so; saturate */

@@ -9,7 +9,7 @@ from conftest import MOTORS
 
 from fluxtrue_tools.motor.flux_model import ConstantModel
 from fluxtrue_tools.motor.motor import load_motor
-from fluxtrue_tools.motor.rectifier import largest_flux_share, sustained_share
+from fluxtrue_tools.motor.rectifier import PULSE_SHARE, largest_flux_share, sustained_share
 
 SIX_STEP = 1.10266  # 2 sqrt(3)/pi
 
@@ -39,14 +39,31 @@ def test_the_flux_at_that_current_is_the_largest_of_all_whose_voltage_opposes_th
     assert largest_flux_share(model) == pytest.approx(largest, rel=0.02)
 
 
-@pytest.mark.parametrize(("name", "short", "opened"), [("hsm1", 0.9, 0.8), ("paper", 1.0, 0.9)])
+@pytest.mark.parametrize(("name", "short", "opened"), [("hsm1", 0.9, 0.8), ("paper", 1.06, 0.96)])
 def test_the_level_of_the_short_circuit_follows_from_it(name: str, short: float, opened: float) -> None:
     derived = load_motor(MOTORS / name).derived
     assert (derived.share_short, derived.share_open) == (
         pytest.approx(short, abs=1e-4),
         pytest.approx(opened, abs=1e-4),
     )
-    assert derived.share_short < 1.0
+
+
+def test_the_pulses_of_the_diodes_join_where_the_level_is_limited() -> None:
+    """A pulse begins where the line back-EMF reaches v_dc and ends when the current is zero again: an integral of the
+    difference, by brute force."""
+    theta = np.linspace(-math.pi / 2.0, math.pi / 2.0, 200_001)
+    for share, joined in ((PULSE_SHARE - 0.001, False), (PULSE_SHARE + 0.001, True)):
+        begin = math.acos(1.0 / share)
+        on = theta[theta >= -begin]
+        current = np.cumsum(share * np.cos(on) - 1.0)
+        end = on[np.flatnonzero(current[1:] < 0.0)[0] + 1]
+        assert (end + begin > math.pi / 3.0) == joined
+
+
+def test_the_level_is_never_above_that_of_pulses() -> None:
+    motor = load_motor(MOTORS.parent.parent / "tests" / "motors" / "prius")
+    assert sustained_share(motor.model) > 1.1
+    assert motor.derived.share_short == 1.06
 
 
 def test_the_level_is_never_below_nine_tenths() -> None:

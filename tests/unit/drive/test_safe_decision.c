@@ -75,7 +75,7 @@ void test_only_a_current_that_the_dc_link_opposes_shows_a_shorted_switch(void)
         setUp();
         snapshot.sample.point.i.q = alive + cases[n].i_above;
         snapshot.sample.zero_q28 = cases[n].mean * 8192;
-        drive.task.safe_state.short_circuit = cases[n].rectifies;
+        drive.task.safe_state.rectifies = cases[n].rectifies;
         (void)step();
         TEST_ASSERT_EQUAL(cases[n].sums, drive.task.gate_fault.opposed > 0);
     }

@@ -21,6 +21,7 @@ void setUp(void)
     snapshot = (snapshot_t){.winding_dC = 250};
     faults = 0;
     drive.task.run_state = RUN_STATE_RUN;
+    drive.task.safe_state.rectifies = true;
     drive.task.safe_state.short_circuit = true;
     drive.task.i_ref = (dq_q15_t){-800, 1600};
 }
@@ -44,7 +45,7 @@ void test_enable_off_is_held_only_at_speed_and_without_a_fault(void)
     for (int k = 0; k < 4; k++) {
         setUp();
         drive.task.run_state = (k == 0) ? RUN_STATE_OFF : RUN_STATE_RUN;
-        drive.task.safe_state.short_circuit = k != 1;
+        drive.task.safe_state.rectifies = k != 1;
         drive.request.current_mode = k == 2;
         faults = (k == 3) ? FAULT_TORQUE : 0U;
         TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, step(RUN_STATE_OFF));
@@ -71,6 +72,18 @@ void test_only_faults_that_leave_control_intact_are_kept_back(void)
         TEST_ASSERT_EQUAL_HEX32(cases[n].moves ? 0U : cases[n].faults, faults);
         TEST_ASSERT_EQUAL(cases[n].moves, switch_off_runs(&drive));
     }
+}
+
+/* Between the two levels a fault disables switching, for which no currents need to be moved; torque that is not wanted
+ * any more is still held at zero there, because the diodes would conduct. */
+void test_where_a_fault_disables_switching_it_is_not_kept_back(void)
+{
+    drive.task.safe_state.short_circuit = false;
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_RUN, step(RUN_STATE_OFF));
+    TEST_ASSERT_TRUE(switch_off_holds(&drive));
+    faults = FAULT_TEMPERATURE;
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, step(RUN_STATE_OFF));
+    TEST_ASSERT_EQUAL_HEX32(FAULT_TEMPERATURE, faults);
 }
 
 /* An eighth of the way in each of 8 steps, then 2 with the currents of the short circuit; the fault of the 11th step

@@ -223,11 +223,11 @@ void test_without_gate_supply_the_hardware_holds_the_bridge_of_a_fast_machine(vo
 {
     tasks(10);
     TEST_ASSERT_FALSE(board.outputs[BOARD_SAFE_STATE]);
-    ecu.drive.task.safe_state.short_circuit = true;
+    ecu.drive.task.safe_state.rectifies = true;
     task_after(10);
     TEST_ASSERT_TRUE(board.outputs[BOARD_SAFE_STATE]);
     ecu.supervisor.state = STATE_SAFE_STATE;
-    ecu.drive.task.safe_state = (safe_state_state_t){.short_circuit = true, .line_emf = Q15_MAX, .speed = Q15_MAX};
+    ecu.drive.task.safe_state = (safe_state_state_t){.rectifies = true, .line_emf = Q15_MAX, .speed = Q15_MAX};
     ecu_seal_flags(&ecu);
     task_after(10);
     TEST_ASSERT_TRUE(board.outputs[BOARD_GATE_DRIVER]);
@@ -245,7 +245,7 @@ void test_until_the_speed_is_known_the_hardware_holds_the_bridge(void)
 /* The speed is still known, by what has outlasted the reset. */
 void test_after_a_reset_at_speed_contactor_and_gate_supply_stay_on_from_the_first_step(void)
 {
-    ecu.drive.task.safe_state = (safe_state_state_t){.short_circuit = true, .line_emf = Q15_MAX, .speed = Q15_MAX};
+    ecu.drive.task.safe_state = (safe_state_state_t){.rectifies = true, .line_emf = Q15_MAX, .speed = Q15_MAX};
     ecu_continue(&ecu);
     task_after(10);
     TEST_ASSERT_TRUE(board.outputs[BOARD_MAIN_CONTACTOR] && board.outputs[BOARD_GATE_DRIVER]);

@@ -171,7 +171,7 @@ void test_current_at_a_speed_at_which_the_diodes_conduct_is_plausible(void)
 {
     sample.point.i = (dq_q15_t){-2000, 500};
     TEST_ASSERT_FALSE(observe()->sensors_plausible);
-    ecu.drive.task.safe_state.short_circuit = true;
+    ecu.drive.task.safe_state.rectifies = true;
     TEST_ASSERT_TRUE(observe()->sensors_plausible);
     sample.v_dc = 8494;
     TEST_ASSERT_FALSE(observe()->sensors_plausible);

@@ -8,7 +8,7 @@
 /* With psi_f = 0.4 the line back-EMF is 0.6928 w. With v_dc = 0.6 the safe state is the short circuit above w = 0.7794,
  * and switching disabled below 0.6928. */
 static const safe_state_config_t config = {
-    .psi_f = 13107, .share_short = 29491, .share_open = 26214, .v_release = 24000};
+    .psi_f = 13107, .share_short = 58982, .share_open = 52429, .v_release = 24000};
 static safe_state_state_t state;
 static safe_state_in_t in;
 
@@ -79,6 +79,41 @@ void test_between_the_thresholds_the_decision_stays(void)
     TEST_ASSERT_TRUE(at(0.695));
     TEST_ASSERT_FALSE(at(0.691));
     TEST_ASSERT_FALSE(at(0.778));
+}
+
+/* With the short circuit from 1.06 v_dc = 0.636 on, w = 0.918, to 0.96 v_dc, w = 0.8314, the diodes conduct from v_dc,
+ * w = 0.866, to 0.9 v_dc, w = 0.7794. Without a valid speed the lower levels are the only ones. */
+void test_with_a_level_above_the_dc_voltage_the_diodes_conduct_before_the_phases_are_shorted(void)
+{
+    static const struct {
+        double omega;
+        bool speed_valid, rectifies, shorted;
+    } cases[] = {{0.864, true, false, false}, {0.868, true, true, false}, {0.916, true, true, false},
+                 {0.920, true, true, true},   {0.834, true, true, true},  {0.829, true, true, false},
+                 {0.916, true, true, false},  {0.782, true, true, false}, {0.777, true, false, false},
+                 {0.834, true, false, false}, {0.834, false, true, true}};
+    safe_state_config_t c = config;
+    c.share_short = 69468;
+    c.share_open = 62915;
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        in.omega = (q15_t)(cases[n].omega * 32768.0);
+        in.speed_valid = cases[n].speed_valid;
+        bool shorted = false;
+        for (int k = 0; k < 251; k++) {
+            shorted = safe_state_step(&c, &state, &in);
+        }
+        TEST_ASSERT_EQUAL(cases[n].rectifies, state.rectifies);
+        TEST_ASSERT_EQUAL(cases[n].shorted, shorted);
+    }
+}
+
+void test_up_to_the_dc_voltage_both_levels_are_the_same(void)
+{
+    for (int k = 0; k < 200; k++) {
+        in.omega = (q15_t)(((k < 100) ? k : 200 - k) * 327);
+        const bool shorted = steps(1);
+        TEST_ASSERT_EQUAL(shorted, state.rectifies);
+    }
 }
 
 void test_a_stronger_identified_magnet_counts_and_a_weaker_one_does_not(void)

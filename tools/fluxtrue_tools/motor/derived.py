@@ -8,7 +8,7 @@ from fluxtrue_tools.motor import identification
 from fluxtrue_tools.motor.bases import Bases, inductance_at_rest
 from fluxtrue_tools.motor.config import Inverter, MotorConfig
 from fluxtrue_tools.motor.flux_model import FluxModel
-from fluxtrue_tools.motor.rectifier import sustained_share
+from fluxtrue_tools.motor.rectifier import PULSE_SHARE, sustained_share
 
 DELAY_PERIODS = 1.5  # one of computation, a half of the PWM's hold
 CLOSED_LOOP_SHARE = 0.8
@@ -80,7 +80,7 @@ NOISE_SHARE = 0.002  # of a current converter's full scale, rms
 NOISE_CREST = 4.0 * 0.27  # 4 times the rms of a mean of four steps: (MN-35)
 PERIOD_NOISE_CREST = 4.0 / 3.0  # times the rms; hsm1 needs no more than its V_0
 MONITOR_NOISE_SHARE = 0.04  # of i_max: the bridge's zero crossing and noise look like a voltage on no current
-SHARE_SHORT_MIN, SHARE_SHORT_MAX = 0.9, 1.0 - 2.0**-15  # of v_dc, by the line back-EMF: (SS-25), as far as Q15 reaches
+SHARE_SHORT_MIN = 0.9  # of v_dc, by the line back-EMF: (SS-25)
 SHARE_HYSTERESIS = 0.1
 V_RELEASE_PER_VDC = 1.15
 
@@ -394,7 +394,7 @@ def _slow_monitors(config: MotorConfig, model: FluxModel, bases: Bases) -> dict[
 
 def _short_circuit_share(model: FluxModel) -> float:
     """Of the dc voltage, above which a fault shorts the phases (SS-25), to a hundredth."""
-    return min(max(SHARE_SHORT_MIN, round(sustained_share(model), 2)), SHARE_SHORT_MAX)
+    return round(min(max(SHARE_SHORT_MIN, sustained_share(model)), PULSE_SHARE), 2)
 
 
 def _monitors(config: MotorConfig, model: FluxModel) -> dict[str, float]:

@@ -558,8 +558,8 @@ def _safe_state(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     return [
         ("psi_f", q15(d.psi_f_Vs / b.flux_Vs, "psi_f"), f"{d.psi_f_Vs:.6g} Vs"),
-        ("share_short", q15(d.share_short, "share_short"), f"{d.share_short:g}"),
-        ("share_open", q15(d.share_open, "share_open"), f"{d.share_open:g}"),
+        ("share_short", q16(d.share_short, "share_short"), f"{d.share_short:g}"),
+        ("share_open", q16(d.share_open, "share_open"), f"{d.share_open:g}"),
         ("v_release", q15(d.v_release_V / b.voltage_V, "v_release"), f"{d.v_release_V:g} V"),
     ]
 

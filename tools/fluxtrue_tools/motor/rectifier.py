@@ -12,6 +12,7 @@ from fluxtrue_tools.motor.flux_model import Array, FluxModel
 POINTS: Final = 401  # along i_d
 BISECTIONS: Final = 40
 SIX_STEP: Final = 2.0 * math.sqrt(3.0) / math.pi  # line voltage's fundamental over v_dc, peak: (SS-24)
+PULSE_SHARE: Final = math.hypot(1.0, 2.0 * math.pi / 3.0 - math.sqrt(3.0))  # e/v_dc, up to which pulses end: (SS-26)
 
 
 def _cancelling_id_A(model: FluxModel, step_A: float) -> float:
