@@ -17,6 +17,7 @@ __asm__(".global angle_sensor_analogue\n.set angle_sensor_analogue, 1");
 #endif
 
 static travel_t sensor;
+static sincos_point_t point;
 
 /* No angle is known before the first valid sample: if the first sample is outside the band, that is a fault at once. */
 void angle_init(uint32_t period_ticks)
@@ -24,6 +25,7 @@ void angle_init(uint32_t period_ticks)
     sensor.sampled_q32 = (int32_t)((UINT32_MAX / period_ticks) * SAMPLING_ANGLE_TICKS);
     sensor.travel = 0;
     sensor.invalid = TRAVEL_INVALID_MAX;
+    point = (sincos_point_t){0};
     excitation_start(period_ticks);
 }
 
@@ -48,7 +50,7 @@ uint32_t hal_angle_read(void)
 {
     const angle_counts_t counts = sampling_angle();
     const sincos_t at = sincos_scaled(counts.sine, counts.cosine);
-    if (sincos_is_valid(at)) {
+    if (sincos_is_valid(at) && sincos_both_move(&point, at)) {
         travel_take(&sensor, sincos_angle(at), true);
     } else {
         travel_predict(&sensor);

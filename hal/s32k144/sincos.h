@@ -3,15 +3,19 @@
 #define HAL_S32K144_SINCOS_H
 /** Angle of a sensor that delivers a sine and a cosine, from one 12-bit count of each.
  *   s = (count - offset)/amplitude, c alike;  valid: low <= s^2 + c^2 <= high;  angle = atan2(s, c)
+ *   A track that stays: one has changed by at most w since an earlier sample, the point, and the other one by M:
+ *   invalid if |s^2 + c^2 - (s^2 + c^2 of the point)| > K M + N; where both have changed by more, the sample is the
+ *   next point
  *   In the first octant atan(t)/2 pi is an odd polynomial in t = min(|s|, |c|)/max(|s|, |c|) of ninth degree; symmetry
  *   gives the others.
- * Source   README.md, sine and cosine; the polynomial is the minimax one on [0, 1], from a Remez exchange
+ * Source   README.md, sine and cosine; docs/theory/monitors.md (MN-54), (MN-55); the polynomial is the minimax one on
+ *          [0, 1], from a Remez exchange
  * Units    counts of the converters; scaled: SINCOS_ONE = the nominal amplitude; angle: fraction of a turn, 2^32 = one
  * Range    every count; sincos_angle(): both below 2^15 in magnitude
  * Rounding sincos_angle(): at most 2e-5 rad (polynomial 1.15e-5, quotient 7.6e-6), an eighth of a count's 6.1e-4 rad
  *          and less; a count is scaled with at most 1.5/16384
  * Errors   sincos_angle(0, 0) is 0 or a quarter turn: sincos_is_valid() refuses it
- * Context  fast ISR; some 40 instructions with one division, no loop */
+ * Context  fast ISR; some 60 instructions with one division, no loop */
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -58,9 +62,26 @@ _Static_assert(SINCOS_SHOWS_ENDS(COSINE_OFFSET, COSINE_AMPLITUDE), "a broken wir
 _Static_assert(SINCOS_FITS(SINE_OFFSET, SINE_AMPLITUDE), "the sine does not fit into 15 bits");
 _Static_assert(SINCOS_FITS(COSINE_OFFSET, COSINE_AMPLITUDE), "the cosine does not fit into 15 bits");
 
+/* A track that stays. w: 8 counts, the noise of two samples. K: between two points that are M apart the square of the
+ * length differs by the offsets' 2 * 0.042 M, and by the difference of the amplitudes (3 %) and the angle between the
+ * tracks (1 degree), together sqrt(0.03^2 + 0.0175^2), times 2 * 1.12/0.98 M: 0.164 M. N: the noise of both samples,
+ * 2 * 1.21 * 0.0035 each, and its share K of M, make 0.018; the rest up to 0.03 is for the rounding and for an
+ * amplitude that changes by 0.5 % at once. */
+#define SINCOS_STILL (8 * SINCOS_ONE / 1638 + 2)                              /* w and the rounding of both samples */
+#define SINCOS_SHARE (17 * SINCOS_ONE / 100)                                  /* K, Q14 */
+#define SINCOS_CHANGE ((int32_t)(3 * (int64_t)SINCOS_ONE * SINCOS_ONE / 100)) /* N, Q28 */
+#define SINCOS_FOLLOW 64U /* samples in which the point moves by 1/16384 towards the present one */
+
 typedef struct {
     int32_t sine, cosine;
 } sincos_t;
+
+/** The point with which later samples are compared; all zero before the first one. */
+typedef struct {
+    int16_t sine, cosine;
+    uint8_t agreed; /* samples that have agreed with it, modulo SINCOS_FOLLOW */
+    bool confirmed; /* one has: it was no disturbed sample */
+} sincos_point_t;
 
 /* Q0 * Q16 = Q16, below 2^31 by the assertion above; truncated. */
 static inline sincos_t sincos_scaled(uint32_t sine_count, uint32_t cosine_count)
@@ -69,10 +90,61 @@ static inline sincos_t sincos_scaled(uint32_t sine_count, uint32_t cosine_count)
                       (((int32_t)cosine_count - COSINE_OFFSET) * SINCOS_GAIN_Q16(COSINE_AMPLITUDE)) >> 16};
 }
 
+static inline uint32_t sincos_square(int32_t sine, int32_t cosine)
+{
+    return (uint32_t)(sine * sine) + (uint32_t)(cosine * cosine);
+}
+
 static inline bool sincos_is_valid(sincos_t at)
 {
-    const uint32_t square = (uint32_t)(at.sine * at.sine) + (uint32_t)(at.cosine * at.cosine);
-    return square - SINCOS_LOW <= SINCOS_HIGH - SINCOS_LOW;
+    return sincos_square(at.sine, at.cosine) - SINCOS_LOW <= SINCOS_HIGH - SINCOS_LOW;
+}
+
+static inline int32_t sincos_distance(int32_t to, int32_t from)
+{
+    return (to > from) ? to - from : from - to;
+}
+
+static inline int32_t sincos_towards(int32_t to, int32_t from)
+{
+    return (to > from) ? 1 : ((to < from) ? -1 : 0);
+}
+
+static inline void sincos_point_take(sincos_point_t *point, sincos_t at)
+{
+    *point = (sincos_point_t){.sine = (int16_t)at.sine, .cosine = (int16_t)at.cosine};
+}
+
+/* A slow change of the amplitude is followed. */
+static inline void sincos_point_follow(sincos_point_t *point, sincos_t at)
+{
+    point->agreed = (uint8_t)((point->agreed + 1U) % SINCOS_FOLLOW);
+    if (point->agreed == 0U) {
+        point->sine = (int16_t)(point->sine + sincos_towards(at.sine, point->sine));
+        point->cosine = (int16_t)(point->cosine + sincos_towards(at.cosine, point->cosine));
+    }
+}
+
+/** False if one track stays although the other one moves as it cannot alone; `at` must be valid. */
+static inline bool sincos_both_move(sincos_point_t *point, sincos_t at)
+{
+    const int32_t sine = sincos_distance(at.sine, point->sine), cosine = sincos_distance(at.cosine, point->cosine);
+    if (sine > SINCOS_STILL && cosine > SINCOS_STILL) {
+        sincos_point_take(point, at);
+        return true;
+    }
+    const int32_t change =
+        fx_abs_q31((int32_t)(sincos_square(at.sine, at.cosine) - sincos_square(point->sine, point->cosine)));
+    if (!point->confirmed && change > SINCOS_CHANGE / 2) {
+        sincos_point_take(point, at); /* one of both was disturbed */
+        return true;
+    }
+    point->confirmed = true;
+    if (change > ((sine > cosine) ? sine : cosine) * SINCOS_SHARE + SINCOS_CHANGE) {
+        return false;
+    }
+    sincos_point_follow(point, at);
+    return true;
 }
 
 /* Coefficients of t, t^3 ... t^9 in Q30, Q32 ... Q38: each product with t^2 in Q30 takes two bits away. */

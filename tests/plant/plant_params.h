@@ -65,8 +65,8 @@ typedef struct {
     int angle_bits;                      /* of a mechanical turn; 0: not quantised */
     double angle_delay_s;
     int angle_stuck;
-    int angle_sine_stuck, angle_cosine_stuck; /* this track of the resolver keeps its value */
-    int angle_length_check;                   /* the converter of both tracks reports a wrong length as NaN, (PL-33) */
+    int angle_sine_stuck, angle_cosine_stuck;   /* this track of the resolver keeps its value */
+    int angle_length_check;                     /* the converter shows NaN for wrong tracks, (PL-33), (PL-34) */
     int angle_spike_every, angle_spike_samples; /* of every angle_spike_every samples, the first are wrong; 0: none */
     double angle_spike_rad;                     /* electrical: error of these samples */
     /* mechanics */

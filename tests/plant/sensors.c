@@ -11,7 +11,11 @@
 #define TWO_PI 6.28318530717958647693
 #define LENGTH_LEAST 0.79
 #define LENGTH_GREATEST 1.21
-#define WRONG_LENGTHS_OF_A_FAILURE 3
+#define TRACK_STILL (8.0 / 1638.0)
+#define LENGTH_CHANGE_SHARE 0.17
+#define LENGTH_CHANGE 0.03
+#define POINT_FOLLOW (1.0 / 64.0 / 16384.0) /* in a sample */
+#define WRONG_SAMPLES_OF_A_FAILURE 3
 
 static double clamp(double x, double lo, double hi)
 {
@@ -67,13 +71,44 @@ static double angle_spike(sensors_t *s, const plant_params_t *p)
     return (sample < p->angle_spike_samples) ? p->angle_spike_rad : 0.0;
 }
 
-/* (PL-33): whether the converter of both tracks has failed. */
-static bool is_failure(sensors_t *s, const plant_params_t *p, double sine, double cosine)
+static double approached(double from, double to)
+{
+    return from + clamp(to - from, -POINT_FOLLOW, POINT_FOLLOW);
+}
+
+static void take_point(sensors_t *s, double sine, double cosine)
+{
+    s->point_sine = sine;
+    s->point_cosine = cosine;
+    s->point_confirmed = false;
+}
+
+/* (PL-34): whether one track stays although the other one moves. */
+static bool does_one_track_stay(sensors_t *s, double sine, double cosine)
+{
+    const double of_sine = fabs(sine - s->point_sine), of_cosine = fabs(cosine - s->point_cosine);
+    const double change =
+        fabs(sine * sine + cosine * cosine - s->point_sine * s->point_sine - s->point_cosine * s->point_cosine);
+    if (fmin(of_sine, of_cosine) > TRACK_STILL || (!s->point_confirmed && change > 0.5 * LENGTH_CHANGE)) {
+        take_point(s, sine, cosine);
+        return false;
+    }
+    s->point_confirmed = true;
+    if (change > LENGTH_CHANGE_SHARE * fmax(of_sine, of_cosine) + LENGTH_CHANGE) {
+        return true;
+    }
+    s->point_sine = approached(s->point_sine, sine);
+    s->point_cosine = approached(s->point_cosine, cosine);
+    return false;
+}
+
+/* (PL-33), (PL-34): whether the converter of both tracks has failed. */
+static bool is_failure(sensors_t *s, double sine, double cosine)
 {
     const double length = hypot(sine, cosine);
-    const bool is_wrong = p->angle_length_check && (length < LENGTH_LEAST || length > LENGTH_GREATEST);
-    s->wrong_lengths = is_wrong ? s->wrong_lengths + (s->wrong_lengths < WRONG_LENGTHS_OF_A_FAILURE) : 0;
-    return s->wrong_lengths >= WRONG_LENGTHS_OF_A_FAILURE;
+    const bool is_wrong = length < LENGTH_LEAST || length > LENGTH_GREATEST || does_one_track_stay(s, sine, cosine);
+    s->wrong_samples = is_wrong ? s->wrong_samples + (s->wrong_samples < WRONG_SAMPLES_OF_A_FAILURE) : 0;
+    return s->wrong_samples >= WRONG_SAMPLES_OF_A_FAILURE;
 }
 
 /* (PL-32): the angle that the tracks of the resolver show, in the turn of the resolver in which it truly is. */
@@ -82,13 +117,12 @@ static double from_tracks(sensors_t *s, const plant_params_t *p, double theta_ra
     const double resolver_rad = p->resolver_pole_pairs * theta_rad;
     s->sine_rad = p->angle_sine_stuck ? s->sine_rad : resolver_rad;
     s->cosine_rad = p->angle_cosine_stuck ? s->cosine_rad : resolver_rad;
-    if (!p->angle_sine_stuck && !p->angle_cosine_stuck) {
-        s->wrong_lengths = 0;
-        return theta_rad;
-    }
     const double sine = sin(s->sine_rad), cosine = cos(s->cosine_rad);
-    if (is_failure(s, p, sine, cosine)) {
+    if (p->angle_length_check && is_failure(s, sine, cosine)) {
         return NAN;
+    }
+    if (!p->angle_sine_stuck && !p->angle_cosine_stuck) {
+        return theta_rad;
     }
     return theta_rad + remainder(atan2(sine, cosine) - resolver_rad, TWO_PI) / p->resolver_pole_pairs;
 }

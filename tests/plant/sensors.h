@@ -5,10 +5,12 @@
  *   current: gain, offset, noise, saturation at the full scale, quantisation
  *   both:    converter reference, which also changes what is read of a known voltage
  *   angle:   delay, offset, first and second harmonic per resolver turn, spikes, a stuck track, quantisation
- * Source   docs/theory/plant.md (PL-17) ... (PL-19), (PL-32), (PL-33)
+ * Source   docs/theory/plant.md (PL-17) ... (PL-19), (PL-32) ... (PL-34)
  * Units    A, V, rad; counts of a converter whose mid-scale is zero current
  * Rounding half up to the nearest code
  * Context  simulation only */
+#include <stdbool.h>
+
 #include "plant.h"
 #include "random.h"
 
@@ -16,8 +18,10 @@ typedef struct {
     random_t rng;
     double current_A[3]; /* last output, repeated by a stuck sensor */
     int32_t current_count[3];
-    double sine_rad, cosine_rad; /* angle of the resolver whose sine, cosine its tracks show */
-    int wrong_lengths;           /* samples in a row, up to those of a failure */
+    double sine_rad, cosine_rad;     /* angle of the resolver whose sine, cosine its tracks show */
+    double point_sine, point_cosine; /* of both tracks, with which later samples are compared, (PL-34) */
+    bool point_confirmed;
+    int wrong_samples; /* in a row, up to those of a failure */
     double theta_m_rad;
     int32_t theta_count;
     int spike_sample; /* index of the next sample in a sequence of angle_spike_every */

@@ -3,6 +3,7 @@
 #include "random.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <string.h>
 
 #include "unity.h"
@@ -380,6 +381,53 @@ void test_a_checked_converter_sees_a_length_that_is_too_large(void)
     (void)shown_at(0.8);
     TEST_ASSERT_TRUE(isnan(shown_at(0.8)));
     TEST_ASSERT_FALSE(isnan(shown_at(0.84))); /* 1.20 */
+}
+
+/* Turns from where a track stays until the converter shows no angle; the track is right for 30 degrees before. */
+static double turns_to_no_angle(double at, bool of_sine, double step)
+{
+    const double sign = step > 0.0 ? 1.0 : -1.0;
+    start();
+    plant_params(plant)->angle_sine_stuck = 0;
+    plant_params(plant)->angle_cosine_stuck = 0;
+    for (double turned = -sign * 30.0 / 360.0; fabs(turned) < 0.75; turned += step) {
+        const bool stays = turned * sign > 0.0;
+        plant_params(plant)->angle_sine_stuck = stays && of_sine;
+        plant_params(plant)->angle_cosine_stuck = stays && !of_sine;
+        if (isnan(shown_at((at + turned) * TWO_PI))) {
+            return stays ? fabs(turned) : -1.0;
+        }
+    }
+    return 1.0;
+}
+
+/* (PL-34), with the angles of (MN-56): 45 degrees at most, 7 on average. */
+void test_a_checked_converter_finds_a_stuck_track_at_every_angle(void)
+{
+    p.angle_length_check = 1;
+    for (int k = 0; k < 4; k++) {
+        const double step = (k & 1) ? 2e-4 : -2e-4;
+        double worst = 0.0, sum = 0.0;
+        for (int n = 0; n < 360; n++) {
+            const double turned = turns_to_no_angle(n / 360.0, (k & 2) != 0, step);
+            TEST_ASSERT_TRUE(turned > 0.0);
+            worst = fmax(worst, turned);
+            sum += turned;
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(2.0, 44.0, 360.0 * worst);
+        TEST_ASSERT_DOUBLE_WITHIN(1.0, 7.0, sum);
+    }
+}
+
+void test_a_checked_converter_shows_every_angle_of_a_good_resolver(void)
+{
+    p.angle_length_check = 1;
+    start();
+    double theta = 0.0;
+    for (int n = 0; n < 20000; n++) {
+        theta += 0.3 * sin(n * 1e-3) * sin(n * 1.7e-3); /* up to 28,000 rpm at 10 kHz, and stops */
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, remainder(shown_at(theta) - theta, TWO_PI));
+    }
 }
 
 /* The first two of five samples; after the spikes were switched off, the sequence starts again. */
