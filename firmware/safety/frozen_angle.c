@@ -58,17 +58,16 @@ static bool update_mean(const frozen_angle_config_t *config, frozen_angle_state_
     return settled;
 }
 
-/* (MN-23) */
+/* (MN-23); at so small a current that two legs may carry none, nothing has changed. That takes another square root,
+ * which is computed only where the voltage has changed. */
 static bool has_changed(const frozen_angle_config_t *config, const frozen_angle_state_t *state,
                         const frozen_angle_in_t *in)
 {
     const int32_t i_held = 2 * config->i_0;
-    if (fx_magnitude(in->i_ref.d, in->i_ref.q) <= 2 * i_held) {
-        return false; /* at so small a current two legs may carry none */
-    }
     const q15_t d = fx_sat_q15((state->mean_q8.d - state->first_q8.d) >> 8);
     const q15_t q = fx_sat_q15((state->mean_q8.q - state->first_q8.q) >> 8);
-    return fx_magnitude(d, q) > ((in->i_phase_min > i_held) ? config->v_0 : UNCERTAIN * config->v_0);
+    return fx_magnitude(d, q) > ((in->i_phase_min > i_held) ? config->v_0 : UNCERTAIN * config->v_0) &&
+           fx_magnitude(in->i_ref.d, in->i_ref.q) > 2 * i_held;
 }
 
 uint32_t frozen_angle_step(const frozen_angle_config_t *config, frozen_angle_state_t *state,

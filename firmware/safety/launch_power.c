@@ -102,16 +102,17 @@ static int32_t noise_of_change(const launch_power_state_t *state)
     return (362 * fx_magnitude(state->noise_q8 >> 9, state->first_noise_q8 >> 9)) >> 7;
 }
 
-/* (MN-29) */
+/* (MN-29); the threshold with the noise needs a square root and is compared only where the one without is exceeded. */
 static bool is_wrong(const launch_power_config_t *config, const launch_power_state_t *state,
                      const launch_power_in_t *in)
 {
     const q15_t current = fx_magnitude(in->i_ref.d, in->i_ref.q);
     const int32_t omega = fx_abs_q31(state->omega_q8 - state->first_omega_q8) >> 8;
     const int32_t psi = config->psi_share + (fx_abs_q15(in->psi_ref.q) >> 3);
-    const int32_t loss_max = fx_max_s32(times(config->v_1, current), noise_of_change(state));
-    const int32_t change = (state->power_q8 - state->first_power_q8) >> 8;
-    return current > config->i_min && fx_abs_q31(change) > loss_max + times(2 * times(omega, psi), current);
+    const int32_t of_tables = times(2 * times(omega, psi), current);
+    const int32_t change = fx_abs_q31((state->power_q8 - state->first_power_q8) >> 8);
+    return current > config->i_min && change > times(config->v_1, current) + of_tables &&
+           change > noise_of_change(state) + of_tables;
 }
 
 uint32_t launch_power_step(const launch_power_config_t *config, launch_power_state_t *state,
