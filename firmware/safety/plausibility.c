@@ -124,14 +124,17 @@ static uint32_t wrong_reference(plausibility_state_t *state, const plausibility_
     return debounce_step(&state->reference, wrong, REFERENCE_STEPS, FAULT_INPUT);
 }
 
+static int32_t largest_of(abc_q15_t i)
+{
+    return fx_max_s32(fx_max_s32(fx_abs_q31(i.a), fx_abs_q31(i.b)), fx_abs_q31(i.c));
+}
+
 /* (MN-38): the zero of a current sensor can be checked only while no current can flow: before the first start, but not
  * when the drive is enabled again while the machine turns. */
 static uint32_t wrong_zero(const plausibility_config_t *config, plausibility_state_t *state,
                            const plausibility_in_t *in)
 {
-    const abc_q15_t i = in->phases;
-    const int32_t largest = fx_max_s32(fx_max_s32(fx_abs_q31(i.a), fx_abs_q31(i.b)), fx_abs_q31(i.c));
-    const int32_t step = (in->at_rest && largest > config->zero_error_max) ? 1 : -1;
+    const int32_t step = (in->at_rest && largest_of(in->phases) > config->zero_error_max) ? 1 : -1;
     state->not_zero = (uint8_t)fx_clamp_q31(state->not_zero + step, 0, ZERO_STEPS);
     return (state->not_zero >= ZERO_STEPS) ? FAULT_INPUT : 0U;
 }

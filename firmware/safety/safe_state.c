@@ -25,8 +25,9 @@ static bool is_steady(dq_q15_t now, dq_q15_t before, int32_t part)
 /* The currents of the short circuit are too small for a machine that turns (SS-7), whatever angle is measured. */
 static bool is_at_rest(const safe_state_config_t *config, safe_state_state_t *state, const safe_state_in_t *in)
 {
-    const bool none = squared(in->psi_current.d, in->psi_current.q) < squared(config->psi_f / 8, 0);
-    return debounce_holds(&state->without_current, in->shorted && in->currents_valid && none, CONFIRMED_STEPS);
+    const bool none = in->shorted && in->currents_valid &&
+                      squared(in->psi_current.d, in->psi_current.q) < squared(config->psi_f / 8, 0);
+    return debounce_holds(&state->without_current, none, CONFIRMED_STEPS);
 }
 
 /* Whether the measured speed may be used now. In the short circuit the currents must stand still in the rotor's
@@ -35,9 +36,9 @@ static bool is_at_rest(const safe_state_config_t *config, safe_state_state_t *st
 static bool is_speed_known(safe_state_state_t *state, const safe_state_in_t *in)
 {
     const bool checked = in->shorted && in->currents_valid;
-    const bool steady = is_steady(in->i, (dq_q15_t){state->i_before.d, state->i_before.q}, 4) &&
+    const bool steady = checked && is_steady(in->i, (dq_q15_t){state->i_before.d, state->i_before.q}, 4) &&
                         is_steady(in->i, in->i_last_period, 8);
-    const bool agreed = debounce_holds(&state->steady, checked && steady, CONFIRMED_STEPS);
+    const bool agreed = debounce_holds(&state->steady, steady, CONFIRMED_STEPS);
     state->i_before = (dq_q15_halfword_t){(q15_t)in->i.d, (q15_t)in->i.q};
     return in->speed_valid && (!checked || agreed);
 }
