@@ -20,9 +20,12 @@ static int32_t limit_of(const second_level_constants_t *constants, const second_
 static int32_t target_of(const second_level_constants_t *constants, const second_level_frames_t *frames, int32_t turn,
                          int32_t sign)
 {
+    const int32_t counts = sign * frames->torque_counts;
     const bool battery_lost = frames->battery.seen && !frames->battery.alive;
-    const int32_t request = per_unit(constants, sign * frames->torque_counts);
-    return battery_lost ? 0 : fx_clamp_q31(request, 0, limit_of(constants, frames, turn, sign));
+    if (battery_lost || counts <= 0) { /* in each direction unless the request has it */
+        return 0;
+    }
+    return fx_min_s32(per_unit(constants, counts), limit_of(constants, frames, turn, sign));
 }
 
 static void follow_target(second_level_side_t *side, int32_t target, int32_t fall, bool next)
