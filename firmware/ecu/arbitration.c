@@ -50,6 +50,16 @@ static void ramp_to(const arbitrate_config_t *config, arbitrate_state_t *state, 
     state->torque_arbitrated = fx_add_q31(state->torque_arbitrated, state->rate);
 }
 
+/* Without the arithmetic of 64 bits in most steps. */
+static void approach(const arbitrate_config_t *config, arbitrate_state_t *state, q31_t target)
+{
+    if (target == state->torque_arbitrated) {
+        state->rate = 0;
+    } else {
+        ramp_to(config, state, target);
+    }
+}
+
 static void ramp_out(const arbitrate_config_t *config, arbitrate_state_t *state)
 {
     const q31_t max = config->ramp_out;
@@ -76,7 +86,7 @@ q15_t arbitrate_step(const arbitrate_config_t *config, arbitrate_state_t *state,
     } else if (in->ramp_out) {
         ramp_out(config, state);
     } else {
-        ramp_to(config, state, torque_target(config, in));
+        approach(config, state, torque_target(config, in));
     }
     return fx_q15_from_q31(state->torque_arbitrated);
 }

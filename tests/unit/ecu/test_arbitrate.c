@@ -301,3 +301,11 @@ void test_a_limit_holds_the_torque_of_either_sign(void)
         TEST_ASSERT_EQUAL_INT32(sign * 80 * COUNT, state.rate);
     }
 }
+
+void test_a_target_at_the_present_torque_ends_the_rate(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        TEST_ASSERT_EQUAL_INT(1000, step_from(1000, sign * 400, 1000));
+        TEST_ASSERT_EQUAL_INT32(0, state.rate);
+    }
+}
