@@ -56,11 +56,10 @@ static q31_t resistance_at(const torque_monitor_config_t *config, int32_t dC)
 /* (MN-32). A reading beyond the range of the winding's temperature counts as the end of the range. */
 static resistance_t resistance(const torque_monitor_config_t *config, int16_t winding_dC)
 {
-    int32_t min_dC = config->winding_min_dC;
-    int32_t max_dC = config->winding_max_dC;
+    const int32_t min_dC = config->winding_min_dC, max_dC = config->winding_max_dC;
     if (temperature_is_known(winding_dC)) {
-        min_dC = fx_clamp_q31(winding_dC, min_dC, max_dC);
-        max_dC = min_dC;
+        const q31_t known = resistance_at(config, fx_clamp_q31(winding_dC, min_dC, max_dC));
+        return (resistance_t){known >> 15, known / TOLERANCE >> 15};
     }
     const q31_t middle = resistance_at(config, (min_dC + max_dC) / 2);
     const q31_t half_range = resistance_at(config, max_dC) - middle;
@@ -92,11 +91,14 @@ static bool is_torque_excessive(const torque_monitor_config_t *config, torque_mo
     const int32_t mean = fx_q15_from_q31(state->deviation);
 
     const q15_t allowed = fx_sat_q15(config->t_0 + (fx_abs_q15(in->torque) >> 3));
+    const int32_t of_torque = fx_mul_q15(allowed, fx_abs_q15(now->speed.omega));
+    if (fx_abs_q31(mean) < of_torque) { /* in most steps; the limit is at least this */
+        return false;
+    }
     /* The tables' slope is not exact, and the flux does not change uniformly during the step. */
     const q15_t drop_error = fx_mul_gain_q15(now->r.error, now->current);
     const q15_t v_error = fx_sat_q15(config->v_0 + (fx_abs_q31(rate.d) + fx_abs_q31(rate.q)) / 2 + drop_error);
-    const int32_t limit = fx_mul_q15(allowed, fx_abs_q15(now->speed.omega)) +
-                          fx_mul_q15(v_error, fx_add_q15(now->current, config->i_0)) +
+    const int32_t limit = of_torque + fx_mul_q15(v_error, fx_add_q15(now->current, config->i_0)) +
                           fx_mul_q15(fx_abs_q15(in->torque), now->speed.doubt);
     if (fx_abs_q31(commanded) < fx_mul_q15(config->t_0, fx_abs_q15(now->speed.omega))) {
         return fx_abs_q31(mean) > limit; /* near zero torque both directions count */
@@ -117,6 +119,10 @@ static bool is_angle_implausible(const torque_monitor_config_t *config, const to
     if (d_share < config->v_0 >> 1) {
         return false; /* at low speed the inverter's voltage error hides the back-EMF */
     }
+    const int32_t strongest = fx_mul_q15(PSI_STRONG, emf_nominal), weakest = -fx_mul_q15(PSI_WEAK, emf_nominal);
+    if (fx_abs_q31(e_d) < d_share && e_magnet < strongest && e_magnet > weakest) {
+        return false; /* in most steps, also without the errors that are allowed in addition */
+    }
     /* Doubled resistance; half of the flux rate for noise, and all of it beyond v_0, because a real change may have
      * ended before the sample. */
     const int32_t flux_rate_abs = fx_abs_q31(rate.d) + fx_abs_q31(rate.q);
@@ -126,8 +132,7 @@ static bool is_angle_implausible(const torque_monitor_config_t *config, const to
     const int32_t d_limit = d_share + (fx_mul_q15(speed_abs, psi_q) >> 3) + fx_mul_q15(now->speed.doubt, psi_q) +
                             v_error;
     const int32_t q_error = v_error + fx_mul_q15(now->speed.doubt, psi_d);
-    return fx_abs_q31(e_d) > d_limit || e_magnet > fx_mul_q15(PSI_STRONG, emf_nominal) + q_error ||
-           e_magnet < -fx_mul_q15(PSI_WEAK, emf_nominal) - q_error;
+    return fx_abs_q31(e_d) > d_limit || e_magnet > strongest + q_error || e_magnet < weakest - q_error;
 }
 
 uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monitor_state_t *state,
