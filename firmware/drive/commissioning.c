@@ -132,6 +132,13 @@ void drive_commission(drive_t *drive, const snapshot_t *snapshot)
     const sample_t *sample = &snapshot->sample;
     const identify_window_t *window = &snapshot->window;
     const commission_config_t *config = &drive->motor->commission;
+    if (drive->request.commissionings != task->commissionings) {
+        start_if_running(drive, snapshot, config);
+        return;
+    }
+    if (!commission_runs(&task->commission)) {
+        return;
+    }
     const commission_in_t in = {
         .sum_i = window->sum_i,
         .sum_u = window->sum_u,
@@ -140,13 +147,8 @@ void drive_commission(drive_t *drive, const snapshot_t *snapshot)
         .acting = window->acting && sample->acting && task->run_state == RUN_STATE_RUN,
         .limited = window->limited != 0U,
     };
-    if (drive->request.commissionings != task->commissionings) {
-        start_if_running(drive, snapshot, config);
-        return;
-    }
-    const bool ran = commission_runs(&task->commission);
     commission_step(config, &task->commission, &in);
-    if (!ran || task->commission.phase != COMMISSION_DONE) {
+    if (task->commission.phase != COMMISSION_DONE) {
         return;
     }
     if (evaluate(drive, (q15_t)sample->v_dc)) {

@@ -12,6 +12,9 @@ static bool has_request(const drive_t *drive)
 void drive_move(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
+    if (drive->request.movement.movement == (uint8_t)MOVEMENT_NONE && task->movement.phase == MOVEMENT_PHASE_IDLE) {
+        return; /* as in almost every step: movement_step() would change nothing */
+    }
     const movement_in_t in = {
         .runs = task->run_state == RUN_STATE_RUN,
         .has_failed = task->run_state == RUN_STATE_FAULT || snapshot->mrai_is_chosen,
