@@ -11,6 +11,11 @@ static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
     return (abc_q15_t){x.a, x.b, x.c};
 }
 
+/* Phase currents of the newest sample, and the reference at its angle. */
+typedef struct {
+    abc_q15_t measured, reference;
+} phases_t;
+
 static uint8_t gate_exceeded_steps(const drive_t *drive, const snapshot_t *snapshot)
 {
     return snapshot->mrai_is_chosen ? 0U : (uint8_t)(IDENTIFY_STEPS * drive->task.identify.gate_exceeded_updates);
@@ -22,7 +27,7 @@ static bool is_at_rest(const snapshot_t *snapshot)
     return !snapshot->sample.acting && !snapshot->gates && drive_stands_still(snapshot->sample.point.omega);
 }
 
-static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref, q15_t u_behind)
+static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, const phases_t *phases, q15_t u_behind)
 {
     const sample_t *sample = &snapshot->sample;
     task_state_t *task = &drive->task;
@@ -37,8 +42,8 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q
         .i_ref = task->i_ref,
         .i_mean = snapshot->i_mean,
         .u_behind = u_behind,
-        .phases = measure_phases(sample->i_ab, sample->zero_q28),
-        .phases_ref = at_once ? phases_ref : in_phases(expected, sample->theta_e),
+        .phases = phases->measured,
+        .phases_ref = at_once ? phases->reference : in_phases(expected, sample->theta_e),
         .omega = fx_q15_from_q31(sample->point.omega),
         .inverter_dC = snapshot->inverter_dC,
         .winding_dC = snapshot->winding_dC,
@@ -157,14 +162,13 @@ static bool is_second_harmonic_constant(uint64_t turns_q60)
     return part < 1ULL << 56; /* within 1/32 of a turn */
 }
 
-static void count_in_short_side(drive_t *drive, const snapshot_t *snapshot, const sample_t *sample, abc_q15_t i_ref,
-                                bool constant)
+static void count_in_short_side(drive_t *drive, const snapshot_t *snapshot, const phases_t *phases, bool counts)
 {
     const short_side_in_t in = {
-        .acting = sample->acting && !constant,
+        .acting = counts,
         .shorted = snapshot->shorted || snapshot->faults != 0U,
-        .i = measure_phases(sample->i_ab, sample->zero_q28),
-        .i_ref = i_ref,
+        .i = phases->measured,
+        .i_ref = phases->reference,
     };
     short_side_step(&drive->task.short_side, &in);
 }
@@ -173,33 +177,36 @@ static void count_in_short_side(drive_t *drive, const snapshot_t *snapshot, cons
  * latched or the short circuit is on, the decision of the last step before it is kept: switching is disabled first.
  * Half a step lies between two samples, so that the second harmonic of a half wave, which may turn by a whole turn in a
  * step, does not look constant. */
-static void update_short_side(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
+static void update_short_side(drive_t *drive, const snapshot_t *snapshot, const phases_t *phases)
 {
     const bool constant = is_second_harmonic_constant(turns_of_step_q60(drive, snapshot->sample.point.omega));
     const uint32_t half_step = drive->period.periods_per_step / 2U;
     const sample_t *before = sample_box_at(&drive->samples, snapshot->generation - half_step);
     if (before->acting) {
-        count_in_short_side(drive, snapshot, before, in_phases(drive->task.i_ref, before->theta_e), constant);
+        const phases_t earlier = {measure_phases(before->i_ab, before->zero_q28),
+                                  in_phases(drive->task.i_ref, before->theta_e)};
+        count_in_short_side(drive, snapshot, &earlier, !constant);
     }
-    count_in_short_side(drive, snapshot, &snapshot->sample, phases_ref, constant);
+    count_in_short_side(drive, snapshot, phases, snapshot->sample.acting && !constant);
 }
 
 uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
 {
     const uint32_t shorted = drive->task.gate_fault.switch_shorted ? (uint32_t)FAULT_GATE : 0U; /* found last step */
-    const abc_q15_t phases_ref = in_phases(drive->task.i_ref, snapshot->sample.theta_e);
+    const phases_t phases = {measure_phases(snapshot->sample.i_ab, snapshot->sample.zero_q28),
+                             in_phases(drive->task.i_ref, snapshot->sample.theta_e)};
     const bool is_window_new = !snapshot->mrai_is_chosen && snapshot->window.acting && snapshot->sample.acting;
     const bool acting = !is_compensation_new(drive) && is_window_new &&
                         !is_fast(turns_of_step_q60(drive, snapshot->sample.point.omega));
     const q15_t u_behind = torque_monitor_missing_voltage(snapshot->lag, drive->task.psi_ref);
-    const uint32_t of_currents = check_currents(drive, snapshot, phases_ref, u_behind);
+    const uint32_t of_currents = check_currents(drive, snapshot, &phases, u_behind);
     if (drive_is_moving(drive)) { /* with the angle of a movement, comparisons with the motor data have no meaning */
         return (of_currents & (FAULT_TEMPERATURE | FAULT_OVER_SPEED | FAULT_INPUT | FAULT_CURRENT_STUCK)) | shorted;
     }
     const bool behind = u_behind > drive->motor->torque_monitor.v_lag;
     uint32_t faults = of_currents | check_torque(drive, snapshot) | shorted;
-    faults |= check_angle(drive, snapshot, phases_ref, acting, behind);
+    faults |= check_angle(drive, snapshot, phases.reference, acting, behind);
     faults |= check_launch(drive, snapshot, acting, behind);
-    update_short_side(drive, snapshot, phases_ref);
+    update_short_side(drive, snapshot, &phases);
     return faults;
 }
