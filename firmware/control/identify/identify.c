@@ -52,11 +52,7 @@ static int32_t measurement_noise(const identify_config_t *config, const identify
 /* Adds the step's share of each word of a measurement. */
 static void add_to_mean(void *mean, const void *now)
 {
-    int32_t *to = mean;
-    const int32_t *from = now;
-    for (unsigned n = 0; n < sizeof(identify_measurement_t) / sizeof *to; n++) {
-        to[n] = fx_mulhi_add(to[n], from[n], PER_STEP);
-    }
+    identify_add_share(mean, now, sizeof(identify_measurement_t) / sizeof(int32_t), PER_STEP);
 }
 
 static void average_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in,
