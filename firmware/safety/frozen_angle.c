@@ -74,7 +74,10 @@ uint32_t frozen_angle_step(const frozen_angle_config_t *config, frozen_angle_sta
                            const frozen_angle_in_t *in)
 {
     if (!in->acting) {
-        *state = (frozen_angle_state_t){.psi = in->psi_ref}; /* a new compensation begins anew at the same flux */
+        if (state->standing != 0U) { /* else it is clear: every step that acts counts here */
+            *state = (frozen_angle_state_t){.standing = 0};
+        }
+        state->psi = in->psi_ref; /* a new compensation begins anew at the same flux */
         return 0;
     }
     const bool changed = update_mean(config, state, in) && has_changed(config, state, in);

@@ -420,3 +420,22 @@ void test_no_argument_wraps(void)
         TEST_ASSERT_TRUE(abs(state.mean_q8.d) <= (40 + 3) * 32768 * 256);
     }
 }
+
+/* Also after a single step, which has stored only a reference, an angle and a voltage. */
+void test_a_step_that_does_not_act_leaves_nothing_but_the_flux(void)
+{
+    static const int acting[] = {1, 2, 40};
+    for (unsigned n = 0; n < sizeof acting / sizeof acting[0]; n++) {
+        in.acting = true;
+        steps(acting[n]);
+        in.acting = false;
+        in.psi_ref = (dq_q15_t){7000, -3000};
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT8(0, state.standing);
+        TEST_ASSERT_EQUAL_INT32(0, state.u_standing.d);
+        TEST_ASSERT_EQUAL_INT32(0, state.i_ref.q);
+        TEST_ASSERT_EQUAL_UINT32(0, state.theta_e);
+        TEST_ASSERT_EQUAL_INT32(7000, state.psi.d);
+        TEST_ASSERT_EQUAL_INT32(-3000, state.psi.q);
+    }
+}
