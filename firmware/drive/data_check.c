@@ -4,10 +4,13 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "fx/codegen.h"
+
 #define WORDS_PER_STEP 4U
 #define STEPS_WITHOUT_WINDOW 4U /* whole steps without a window; the fast ISR completes one window in each step */
 
 #define WORDS (DATA_CHECK_PERIOD_WORDS + DATA_CHECK_PARAMETERS_WORDS + DATA_CHECK_MRAI_WORDS)
+#define LAST (WORDS - WORDS_PER_STEP) /* first word of a round's last step */
 #define LIVE offsetof(drive_t, period)
 #define COMPLEMENTS offsetof(drive_t, data_check.period)
 
@@ -93,19 +96,19 @@ void data_check_restore_pointer(drive_t *drive)
     }
 }
 
-/* The words of this step; the last step of a round has fewer. */
+/* The words of this step. The last step of a round compares the last words, some of them perhaps again. */
 static bool words_match(drive_t *drive)
 {
     data_check_t *data_check = &drive->data_check;
     const uint8_t *live = (const uint8_t *)drive + LIVE;
     const uint8_t *complements = (const uint8_t *)drive + COMPLEMENTS;
-    const uint32_t first = (data_check->at < WORDS) ? data_check->at : 0U;
+    const uint32_t first = (data_check->at < LAST) ? data_check->at : LAST;
     uint32_t differing_bits = UINT32_MAX; /* of word and complement: all of them */
-    /* MCDC_EXCL C2: with these types a round is a whole number of steps; the bound is for others */
-    for (uint32_t n = first; n < first + WORDS_PER_STEP && n < WORDS; n++) {
-        differing_bits &= word_at(live, n) ^ word_at(complements, n);
+    FX_UNROLLED
+    for (uint32_t n = 0; n < WORDS_PER_STEP; n++) {
+        differing_bits &= word_at(live, first + n) ^ word_at(complements, first + n);
     }
-    data_check->at = first + WORDS_PER_STEP;
+    data_check->at = (first == LAST) ? 0U : first + WORDS_PER_STEP;
     return differing_bits == UINT32_MAX;
 }
 
