@@ -18,6 +18,10 @@ q15_t excess_torque_estimate(drive_t *drive)
 {
     task_state_t *task = &drive->task;
     const int32_t estimated = task->identification.torque_estimated;
+    if (!is_weakening(task)) {
+        task->excessive = 0;
+        return (q15_t)estimated;
+    }
     const int32_t commanded = task->torque_commanded;
     const int32_t model = fx_q15_from_q31(task->torque_loop.model);
     const int32_t sign = (commanded < 0) ? -1 : 1;
@@ -25,7 +29,6 @@ q15_t excess_torque_estimate(drive_t *drive)
     const q15_t share = (task->excessive < EXCESS_STEPS) ? EXCESS : EXCESS_LEFT;
     const int32_t tolerated = fx_mul_q15(share, least) + fx_abs_q31(commanded - model);
     const int32_t excess = sign * (estimated - model) - tolerated;
-    const bool counts = excess > 0 && is_weakening(task);
-    task->excessive = counts ? (uint8_t)fx_min_s32(task->excessive + 1, EXCESS_STEPS) : 0U;
+    task->excessive = (excess > 0) ? (uint8_t)fx_min_s32(task->excessive + 1, EXCESS_STEPS) : 0U;
     return fx_sat_q15(estimated + ((task->excessive < EXCESS_STEPS) ? 0 : EXCESS_GAIN * sign * excess));
 }

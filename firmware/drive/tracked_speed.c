@@ -18,6 +18,9 @@ int32_t tracked_speed_far_behind(const snapshot_t *snapshot)
 q15_t tracked_speed_planned(const snapshot_t *snapshot)
 {
     const q15_t omega = fx_q15_from_q31(snapshot->sample.point.omega);
+    if (snapshot->lag == 0) { /* in most steps */
+        return omega;
+    }
     const int32_t more = tracked_speed_far_behind(snapshot);
     return fx_sat_q15((omega < 0) ? omega + fx_min_s32(more, 0) : omega + fx_max_s32(more, 0));
 }
