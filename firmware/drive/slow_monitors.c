@@ -2,8 +2,9 @@
 #include "drive/slow_monitors.h"
 
 #include "control/current/transform.h"
+#include "fx/codegen.h"
 
-static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
+static inline FX_INLINED_IF_OPTIMISED abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
 {
     const ab_q30_t q30 = inverse_park_q30(i, fx_rotation(theta_e));
     const int32_t alpha = transform_round(q30.alpha);
@@ -95,7 +96,7 @@ static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot, abc_q15_
         .u_sum = window->sum_u,
         .i_ref = task->i_ref,
         .psi_ref = task->psi_ref,
-        .i_phase_min = least_of(phases_ref),
+        .i_phase_min = acting ? least_of(phases_ref) : (q15_t)0,
         .theta_e = snapshot->sample.theta_e,
     };
     return frozen_angle_step(&drive->motor->frozen_angle, &task->frozen_angle, &in);

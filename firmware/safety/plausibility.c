@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "safety/plausibility.h"
 
+#include "fx/codegen.h"
 #include "fx/q.h"
 #include "fx/sqrt.h"
 #include "fx/vec.h"
@@ -36,8 +37,8 @@ static uint32_t deviation(const plausibility_config_t *config, plausibility_stat
 
 /* (MN-2): only samples in which the reference is large count, not the zero crossings. The two directions of the current
  * count apart, because one open switch stops the current in one of them only. */
-static bool is_phase_lost(const plausibility_config_t *config, int8_t count[2], int32_t alive, int32_t reference,
-                          int32_t measured)
+static inline FX_INLINED_IF_OPTIMISED bool is_phase_lost(const plausibility_config_t *config, int8_t count[2],
+                                                         int32_t alive, int32_t reference, int32_t measured)
 {
     if (fx_abs_q31(reference) > alive) {
         const bool negative = reference < 0;

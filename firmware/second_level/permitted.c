@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "second_level/permitted.h"
 
+#include "fx/codegen.h"
+
 static int32_t per_unit(const second_level_constants_t *constants, int32_t counts)
 {
     return (int32_t)(((int64_t)constants->torque_per_count * counts + 0x8000) >> 16);
@@ -17,8 +19,8 @@ static int32_t limit_of(const second_level_constants_t *constants, const second_
     return fx_min_s32(per_unit(constants, certain ? limit : larger), constants->torque_max);
 }
 
-static int32_t target_of(const second_level_constants_t *constants, const second_level_frames_t *frames, int32_t turn,
-                         int32_t sign)
+static inline FX_INLINED_IF_OPTIMISED int32_t target_of(const second_level_constants_t *constants,
+                                                        const second_level_frames_t *frames, int32_t turn, int32_t sign)
 {
     const int32_t counts = sign * frames->torque_counts;
     const bool battery_lost = frames->battery.seen && !frames->battery.alive;
@@ -28,7 +30,8 @@ static int32_t target_of(const second_level_constants_t *constants, const second
     return fx_min_s32(per_unit(constants, counts), limit_of(constants, frames, turn, sign));
 }
 
-static void follow_target(second_level_side_t *side, int32_t target, int32_t fall, bool next)
+static inline FX_INLINED_IF_OPTIMISED void follow_target(second_level_side_t *side, int32_t target, int32_t fall,
+                                                         bool next)
 {
     int32_t largest = target;
     if (next) {
