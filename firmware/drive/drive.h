@@ -157,6 +157,7 @@ typedef struct {
     volatile int32_t angle_correction[ANGLE_HARMONICS_PARTS]; /* 2^32 = one turn; the fast ISR reads one word */
     plausibility_state_t plausibility;
     torque_monitor_state_t torque_monitor;
+    uint32_t current_moved; /* the largest change of the current in a period of the last step, (|D|/2)^2, Q30 */
     frozen_angle_state_t frozen_angle;
     launch_power_state_t launch_power;
     int32_t monitored_dead_time_q16; /* compensation of the last step, for the monitors of a standing angle */

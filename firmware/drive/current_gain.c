@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/current_gain.h"
+
+#include "fx/vec.h"
+#include "safety/current_jump.h"
+
+#define CURRENT_MIN Q15(0.04) /* twice the smallest jump that is found, of full scale */
+#define AFTER_PERIODS 8U      /* in which the current must be as quiet after a jump as before it */
+#define VOLTAGE_PERIODS 3U    /* the voltage of a period is computed with the dc voltage of up to two periods before */
+#define VOLTAGE_SHIFT 5       /* a change of the dc voltage by a 32nd explains a jump */
+
+static bool is_near(int32_t v_dc, int32_t reference)
+{
+    return fx_abs_q31(v_dc - reference) <= reference >> VOLTAGE_SHIFT;
+}
+
+/* (MN-59): the bridge has followed current control all the time, and its voltage was what the duties say. */
+static bool is_voltage_known(const sample_box_t *box, uint32_t at)
+{
+    const sample_t *now = sample_box_at(box, at), *next = sample_box_at(box, at + 1U);
+    const sample_t *before = sample_box_at(box, at - VOLTAGE_PERIODS);
+    return before->acting && now->acting && next->acting && !sample_box_at(box, at - 1U)->pulses_clamped &&
+           is_near(before->v_dc, now->v_dc) && is_near(next->v_dc, now->v_dc);
+}
+
+/* (MN-61): the voltage of the period before the jump, less that of the period before it, would have moved the current
+ * by less than half of the jump. The gain is that of three periods or more. */
+static bool is_unexplained(const sample_box_t *box, uint32_t at, q16_t gain)
+{
+    const operating_point_t *k = &sample_box_at(box, at)->point, *last = &sample_box_at(box, at - 1U)->point;
+    const operating_point_t *before = &sample_box_at(box, at - 2U)->point;
+    const q15_t moved = fx_magnitude(fx_sat_q15(k->i.d - last->i.d), fx_sat_q15(k->i.q - last->i.q));
+    const q15_t driven = fx_magnitude(fx_sat_q15(last->u.d - before->u.d), fx_sat_q15(last->u.q - before->u.q));
+    return fx_mul_gain_q15_word(gain, driven) < moved + moved / 2;
+}
+
+/* (MN-62): noise that begins or grows goes on; the answer of current control moves a third of the jump at most. */
+static bool is_quiet_after(const sample_box_t *box, uint32_t at, const current_jump_t *jump)
+{
+    bool quiet = current_jump_stays(jump, sample_box_at(box, at + 1U)->point.i);
+    current_jump_t on = {.last = sample_box_at(box, at + 1U)->point.i};
+    for (uint32_t n = 2; quiet && n <= AFTER_PERIODS; n++) {
+        current_jump_step(&on, sample_box_at(box, at + n)->point.i);
+        quiet = on.largest <= jump->jump >> 2;
+    }
+    return quiet;
+}
+
+static bool finds_jump(const sample_box_t *box, uint32_t first, uint32_t end, q16_t gain, current_jump_t *jump)
+{
+    bool found = false;
+    for (uint32_t at = first; at != end; at++) {
+        current_jump_step(jump, sample_box_at(box, at)->point.i);
+        found = found || (jump->jump != 0U && is_quiet_after(box, at, jump) && is_voltage_known(box, at) &&
+                          is_unexplained(box, at, gain));
+    }
+    return found;
+}
+
+bool current_gain_has_jumped(drive_t *drive, const snapshot_t *snapshot)
+{
+    task_state_t *task = &drive->task;
+    if (!snapshot->sample.acting || snapshot->i_magnitude < CURRENT_MIN || drive_bypasses_torque_path(drive)) {
+        task->current_moved = UINT32_MAX; /* nothing stands out in the step after this one */
+        return false;
+    }
+    const uint32_t end = snapshot->generation + 1U - AFTER_PERIODS, first = end - drive->period.periods_per_step;
+    current_jump_t jump = {
+        .last = sample_box_at(&drive->samples, first - 1U)->point.i,
+        .before = task->current_moved,
+    };
+    const bool found = finds_jump(&drive->samples, first, end, drive->motor->plausibility.behind_gain, &jump);
+    task->current_moved = jump.largest;
+    return found;
+}

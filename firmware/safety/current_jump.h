@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef SAFETY_CURRENT_JUMP_H
+#define SAFETY_CURRENT_JUMP_H
+/** Finds current sensors whose common gain jumps: the measured current jumps along itself from one sample to the next,
+ * and stays there. The flux of a winding cannot jump, so that its current goes on changing, or turns back.
+ *   D_k    = i_k - i_(k-1) in the rotor frame
+ *   jump   |D_k| > 0.02 of full scale, > 2 |D| of all samples of this step before it and of the step before;
+ *          |i_(k-1)|/16 < |D_k| < |i_(k-1)|/2, |D_k x i_(k-1)| < |D_k . i_(k-1)|/2
+ *   stays  |D_(k+1)| < |D_k|/4: what current control answers to sample k acts after sample k+1 only
+ * Source   docs/theory/monitors.md (MN-57), (MN-58)
+ * Units    per unit of the full scale of the current converters
+ * Range    every current
+ * Rounding half a count of each component of D
+ * Errors   returns true if a jump has stayed; the caller knows whether a voltage can have caused it
+ * Context  1 kHz task, for each period of a step; no division, no root */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "types/frames.h"
+
+typedef struct {
+    dq_q15_t last;    /* the sample before */
+    uint32_t largest; /* (|D|/2)^2 of the samples in this step before it, Q30 */
+    uint32_t before;  /* the same of the whole step before */
+    uint32_t jump;    /* (|D|/2)^2 of the sample before if it is a jump, else 0 */
+} current_jump_t;
+
+/** Whether the sample before was a jump from which this one has not moved. */
+bool current_jump_stays(const current_jump_t *jump, dq_q15_t i);
+
+/** The next sample. */
+void current_jump_step(current_jump_t *jump, dq_q15_t i);
+
+#endif
