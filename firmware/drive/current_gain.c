@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/current_gain.h"
 
+#include "fx/codegen.h"
 #include "fx/vec.h"
 #include "safety/current_jump.h"
 
 #define CURRENT_MIN Q15(0.04) /* twice the smallest jump that is found, of full scale */
+#define MOVED_SHIFT 12        /* Q30 to Q18 */
+#define MOVED_LSB (1U << MOVED_SHIFT)
 #define AFTER_PERIODS 8U      /* in which the current must be as quiet after a jump as before it */
 #define VOLTAGE_PERIODS 3U    /* the voltage of a period is computed with the dc voltage of up to two periods before */
 #define VOLTAGE_SHIFT 5       /* a change of the dc voltage by a 32nd explains a jump */
@@ -46,30 +49,49 @@ static bool is_quiet_after(const sample_box_t *box, uint32_t at, const current_j
     return quiet;
 }
 
-static bool finds_jump(const sample_box_t *box, uint32_t first, uint32_t end, q16_t gain, current_jump_t *jump)
+/* The largest change of the current in a step. */
+typedef struct {
+    uint32_t at;     /* the sample after it */
+    uint32_t moved;  /* (|D|/2)^2, Q30 */
+    uint32_t before; /* the largest one of the samples before it in the step */
+} change_t;
+
+static change_t largest_change(const sample_box_t *box, uint32_t first, uint32_t end)
 {
-    bool found = false;
+    change_t largest = {.at = first};
+    dq_q15_t last = sample_box_at(box, first - 1U)->point.i;
+    FX_ADDRESS_ONCE(box);
     for (uint32_t at = first; at != end; at++) {
-        current_jump_step(jump, sample_box_at(box, at)->point.i);
-        found = found || (jump->jump != 0U && is_quiet_after(box, at, jump) && is_voltage_known(box, at) &&
-                          is_unexplained(box, at, gain));
+        const dq_q15_t now = sample_box_at(box, at)->point.i;
+        const uint32_t moved = current_jump_moved(last, now);
+        if (moved > largest.moved) {
+            largest = (change_t){at, moved, largest.moved};
+        }
+        last = now;
     }
-    return found;
+    return largest;
+}
+
+static bool has_jumped(const drive_t *drive, const change_t *change, uint32_t before)
+{
+    const sample_box_t *box = &drive->samples;
+    current_jump_t jump = {
+        .last = sample_box_at(box, change->at - 1U)->point.i, .largest = change->before, .before = before};
+    current_jump_step(&jump, sample_box_at(box, change->at)->point.i);
+    return jump.jump != 0U && is_quiet_after(box, change->at, &jump) && is_voltage_known(box, change->at) &&
+           is_unexplained(box, change->at, drive->motor->plausibility.behind_gain);
 }
 
 bool current_gain_has_jumped(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
     if (!snapshot->sample.acting || snapshot->i_magnitude < CURRENT_MIN || drive_bypasses_torque_path(drive)) {
-        task->current_moved = UINT32_MAX; /* nothing stands out in the step after this one */
+        task->current_moved_q18 = UINT16_MAX; /* nothing stands out in the step after this one */
         return false;
     }
     const uint32_t end = snapshot->generation + 1U - AFTER_PERIODS, first = end - drive->period.periods_per_step;
-    current_jump_t jump = {
-        .last = sample_box_at(&drive->samples, first - 1U)->point.i,
-        .before = task->current_moved,
-    };
-    const bool found = finds_jump(&drive->samples, first, end, drive->motor->plausibility.behind_gain, &jump);
-    task->current_moved = jump.largest;
-    return found;
+    const uint32_t before = (uint32_t)task->current_moved_q18 << MOVED_SHIFT;
+    const change_t largest = largest_change(&drive->samples, first, end);
+    task->current_moved_q18 = (uint16_t)fx_usat_bits((int32_t)((largest.moved + MOVED_LSB - 1U) >> MOVED_SHIFT), 16);
+    return current_jump_stands_out(largest.moved, before) && has_jumped(drive, &largest, before);
 }

@@ -3,7 +3,7 @@
 #define DRIVE_CURRENT_GAIN_H
 /** Whether the common gain of the current sensors has jumped, by the samples of a step (safety/current_jump.h):
  *   the dc voltage was steady, the pulses before the jump were not clamped; T_s/l_min |u_(k-1) - u_(k-2)| < |D_k|/2;
- *   |D_j| <= |D_k|/2 for j = k + 2 ... k + 8
+ *   |D_j| <= |D_k|/2 for j = k + 2 ... k + 8; D_k is the largest change of its step
  *   A jump is therefore found 8 periods later at the earliest.
  * Source   docs/theory/monitors.md (MN-57) ... (MN-62)
  * Units    per unit

@@ -157,7 +157,6 @@ typedef struct {
     volatile int32_t angle_correction[ANGLE_HARMONICS_PARTS]; /* 2^32 = one turn; the fast ISR reads one word */
     plausibility_state_t plausibility;
     torque_monitor_state_t torque_monitor;
-    uint32_t current_moved; /* the largest change of the current in a period of the last step, (|D|/2)^2, Q30 */
     frozen_angle_state_t frozen_angle;
     launch_power_state_t launch_power;
     int32_t monitored_dead_time_q16; /* compensation of the last step, for the monitors of a standing angle */
@@ -170,6 +169,7 @@ typedef struct {
     rotating_flux_t rotating;    /* whose rotational voltage the target makes (CC-25) */
     dead_time_trim_state_t trim; /* of the compensation: added while driving */
     uint16_t derating;           /* DERATING_...: reasons for less than the requested torque */
+    uint16_t current_moved_q18;  /* largest change of the current in a period of the last step, (|D|/2)^2, rounded up */
     q15_t torque_commanded;      /* the limited torque after slew */
     q15_t torque_corrected;      /* after the torque loop: input of the current reference */
     run_state_t run_state;

@@ -3,8 +3,6 @@
 
 #include "fx/q.h"
 
-#define MOVED_MIN 107374 /* (0.02/2)^2, Q30 */
-
 /* Halved components: their squares fit a word. */
 static dq_q15_t half_of_difference(dq_q15_t a, dq_q15_t b)
 {
@@ -28,14 +26,15 @@ static bool is_along(dq_q15_t i, dq_q15_t moved)
 
 bool current_jump_stays(const current_jump_t *jump, dq_q15_t i)
 {
-    return squared(half_of_difference(i, jump->last)) < jump->jump >> 4;
+    return current_jump_moved(jump->last, i) < jump->jump >> 4;
 }
 
 void current_jump_step(current_jump_t *jump, dq_q15_t i)
 {
     const dq_q15_t moved = half_of_difference(i, jump->last);
-    const uint32_t of_jump = squared(moved), quiet = of_jump >> 2;
-    const bool stands_out = of_jump > (uint32_t)MOVED_MIN && quiet > jump->largest && quiet > jump->before;
+    const uint32_t of_jump = squared(moved);
+    const bool stands_out = current_jump_stands_out(of_jump, jump->largest) &&
+                            current_jump_stands_out(of_jump, jump->before);
     jump->jump = (stands_out && is_along(jump->last, moved)) ? of_jump : 0U;
     jump->largest = (of_jump > jump->largest) ? of_jump : jump->largest;
     jump->last = i;

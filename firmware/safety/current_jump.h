@@ -18,12 +18,27 @@
 
 #include "types/frames.h"
 
+#define CURRENT_JUMP_MIN 107374U /* (0.02/2)^2, Q30 */
+
 typedef struct {
     dq_q15_t last;    /* the sample before */
     uint32_t largest; /* (|D|/2)^2 of the samples in this step before it, Q30 */
     uint32_t before;  /* the same of the whole step before */
     uint32_t jump;    /* (|D|/2)^2 of the sample before if it is a jump, else 0 */
 } current_jump_t;
+
+/** (|D|/2)^2 of two samples in a row, Q30: at most 2^31 for components within 1. */
+static inline uint32_t current_jump_moved(dq_q15_t last, dq_q15_t now)
+{
+    const int32_t d = (now.d - last.d) >> 1, q = (now.q - last.q) >> 1;
+    return (uint32_t)(d * d) + (uint32_t)(q * q);
+}
+
+/** Whether a change of this size can stand out where the changes before it were `before` at most. */
+static inline bool current_jump_stands_out(uint32_t moved, uint32_t before)
+{
+    return moved > CURRENT_JUMP_MIN && moved >> 2 > before;
+}
 
 /** Whether the sample before was a jump from which this one has not moved. */
 bool current_jump_stays(const current_jump_t *jump, dq_q15_t i);
