@@ -7,7 +7,7 @@
 
 #define CURRENT_MIN Q15(0.04) /* twice the smallest jump that is found, of full scale */
 #define MOVED_SHIFT 12        /* Q30 to Q18 */
-#define MOVED_LSB (1U << MOVED_SHIFT)
+#define MOVED_LSB 4096U
 #define AFTER_PERIODS 8U      /* in which the current must be as quiet after a jump as before it */
 #define VOLTAGE_PERIODS 3U    /* the voltage of a period is computed with the dc voltage of up to two periods before */
 #define VOLTAGE_SHIFT 5       /* a change of the dc voltage by a 32nd explains a jump */
@@ -90,7 +90,7 @@ bool current_gain_has_jumped(drive_t *drive, const snapshot_t *snapshot)
         return false;
     }
     const uint32_t end = snapshot->generation + 1U - AFTER_PERIODS, first = end - drive->period.periods_per_step;
-    const uint32_t before = (uint32_t)task->current_moved_q18 << MOVED_SHIFT;
+    const uint32_t before = (uint32_t)task->current_moved_q18 * MOVED_LSB;
     const change_t largest = largest_change(&drive->samples, first, end);
     task->current_moved_q18 = (uint16_t)fx_usat_bits((int32_t)((largest.moved + MOVED_LSB - 1U) >> MOVED_SHIFT), 16);
     return current_jump_stands_out(largest.moved, before) && has_jumped(drive, &largest, before);

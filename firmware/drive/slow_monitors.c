@@ -16,7 +16,7 @@ static inline FX_INLINED_IF_OPTIMISED abc_q15_t in_phases(dq_q15_t i, uint32_t t
 /* Phase currents of the newest sample, and the reference at its angle. */
 typedef struct {
     abc_q15_t measured, reference;
-} phases_t;
+} phase_currents_t;
 
 static uint8_t gate_exceeded_steps(const drive_t *drive, const snapshot_t *snapshot)
 {
@@ -29,7 +29,8 @@ static bool is_at_rest(const snapshot_t *snapshot)
     return !snapshot->sample.acting && !snapshot->gates && drive_stands_still(snapshot->sample.point.omega);
 }
 
-static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, const phases_t *phases, q15_t u_behind)
+static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, const phase_currents_t *phases,
+                               q15_t u_behind)
 {
     const sample_t *sample = &snapshot->sample;
     task_state_t *task = &drive->task;
@@ -164,7 +165,7 @@ static bool is_second_harmonic_constant(uint64_t turns_q60)
     return part < 1ULL << 56; /* within 1/32 of a turn */
 }
 
-static void count_in_short_side(drive_t *drive, const snapshot_t *snapshot, const phases_t *phases, bool counts)
+static void count_in_short_side(drive_t *drive, const snapshot_t *snapshot, const phase_currents_t *phases, bool counts)
 {
     const short_side_in_t in = {
         .acting = counts,
@@ -179,14 +180,14 @@ static void count_in_short_side(drive_t *drive, const snapshot_t *snapshot, cons
  * latched or the short circuit is on, the decision of the last step before it is kept: switching is disabled first.
  * Half a step lies between two samples, so that the second harmonic of a half wave, which may turn by a whole turn in a
  * step, does not look constant. */
-static void update_short_side(drive_t *drive, const snapshot_t *snapshot, const phases_t *phases)
+static void update_short_side(drive_t *drive, const snapshot_t *snapshot, const phase_currents_t *phases)
 {
     const bool constant = is_second_harmonic_constant(turns_of_step_q60(drive, snapshot->sample.point.omega));
     const uint32_t half_step = drive->period.periods_per_step / 2U;
     const sample_t *before = sample_box_at(&drive->samples, snapshot->generation - half_step);
     if (before->acting) {
-        const phases_t earlier = {measure_phases(before->i_ab, before->zero_q28),
-                                  in_phases(drive->task.i_ref, before->theta_e)};
+        const phase_currents_t earlier = {measure_phases(before->i_ab, before->zero_q28),
+                                          in_phases(drive->task.i_ref, before->theta_e)};
         count_in_short_side(drive, snapshot, &earlier, !constant);
     }
     count_in_short_side(drive, snapshot, phases, snapshot->sample.acting && !constant);
@@ -195,8 +196,8 @@ static void update_short_side(drive_t *drive, const snapshot_t *snapshot, const 
 uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
 {
     const uint32_t shorted = drive->task.gate_fault.switch_shorted ? (uint32_t)FAULT_GATE : 0U; /* found last step */
-    const phases_t phases = {measure_phases(snapshot->sample.i_ab, snapshot->sample.zero_q28),
-                             in_phases(drive->task.i_ref, snapshot->sample.theta_e)};
+    const phase_currents_t phases = {measure_phases(snapshot->sample.i_ab, snapshot->sample.zero_q28),
+                                     in_phases(drive->task.i_ref, snapshot->sample.theta_e)};
     const bool is_window_new = !snapshot->mrai_is_chosen && snapshot->window.acting && snapshot->sample.acting;
     const bool acting = !is_compensation_new(drive) && is_window_new &&
                         !is_fast(turns_of_step_q60(drive, snapshot->sample.point.omega));

@@ -18,9 +18,9 @@ typedef struct {
     int32_t i[3];     /* at the end */
     bool turned[3];   /* the current has turned around */
     int known;        /* number of phases with a direction */
-} phases_t;
+} bridge_phases_t;
 
-static void add_phase(phases_t *phases, int x, int32_t last, int32_t now, int32_t i_min)
+static void add_phase(bridge_phases_t *phases, int x, int32_t last, int32_t now, int32_t i_min)
 {
     const int32_t size = fx_abs_q31(now), size_last = fx_abs_q31(last);
     const bool known = size > i_min;
@@ -31,24 +31,23 @@ static void add_phase(phases_t *phases, int x, int32_t last, int32_t now, int32_
     phases->g[x] = known ? fx_div_q15(from_none ? now : last + now, from_none ? size : size_last + size) : 0;
 }
 
-static phases_t phases_of(const shorted_switch_in_t *in)
+/* phases: all zero before. */
+static void phases_of(const shorted_switch_in_t *in, bridge_phases_t *phases)
 {
     const int32_t alpha = fx_sat_q15(in->psi.alpha - in->psi_last.alpha);
     const int32_t side = fx_mul_q15(fx_sat_q15(in->psi.beta - in->psi_last.beta), Q15(SQRT3_HALF));
     const int32_t b = side - (alpha >> 1);
     const int32_t added[3] = {alpha, b, b - 2 * side};
-    phases_t phases = {0};
     for (int x = 0; x < 3; x++) {
-        phases.six_u[x] = 6 * fx_mulhi(added[x] * GAIN_TO_EIGHTH, in->turn_gain);
+        phases->six_u[x] = 6 * fx_mulhi(added[x] * GAIN_TO_EIGHTH, in->turn_gain);
     }
-    add_phase(&phases, 0, in->i_last.a, in->i.a, in->i_min);
-    add_phase(&phases, 1, in->i_last.b, in->i.b, in->i_min);
-    add_phase(&phases, 2, in->i_last.c, in->i.c, in->i_min);
-    return phases;
+    add_phase(phases, 0, in->i_last.a, in->i.a, in->i_min);
+    add_phase(phases, 1, in->i_last.b, in->i.b, in->i_min);
+    add_phase(phases, 2, in->i_last.c, in->i.c, in->i_min);
 }
 
 /* The phase whose r has the largest magnitude, and six times that r. */
-static int largest_of(const phases_t *phases, int32_t v_dc, int32_t *six_r)
+static int largest_of(const bridge_phases_t *phases, int32_t v_dc, int32_t *six_r)
 {
     const int32_t sum = phases->g[0] + phases->g[1] + phases->g[2];
     int largest = 0;
@@ -64,7 +63,7 @@ static int largest_of(const phases_t *phases, int32_t v_dc, int32_t *six_r)
 }
 
 /* The straight line is only a bound for the phase that has turned around itself. */
-static void discard_turned(phases_t *phases)
+static void discard_turned(bridge_phases_t *phases)
 {
     for (int x = 0; x < 3; x++) {
         phases->g[x] = phases->turned[x] ? 0 : phases->g[x];
@@ -75,7 +74,8 @@ static void discard_turned(phases_t *phases)
 shorted_switch_t shorted_switch_find(const shorted_switch_in_t *in)
 {
     const q15_t v_dc = fx_mul_q15((q15_t)in->v_dc, EIGHTH_OF_TURN);
-    phases_t phases = phases_of(in);
+    bridge_phases_t phases = {0};
+    phases_of(in, &phases);
     int32_t six_r;
     int x = largest_of(&phases, v_dc, &six_r);
     if (!phases.turned[x]) {

@@ -52,7 +52,9 @@ static int32_t measurement_noise(const identify_config_t *config, const identify
 /* Adds the step's share of each word of a measurement. */
 static void add_to_mean(void *mean, const void *now)
 {
-    identify_add_share(mean, now, sizeof(identify_measurement_t) / sizeof(int32_t), PER_STEP);
+    int32_t *to = mean;
+    const int32_t *from = now;
+    identify_add_share(to, from, sizeof(identify_measurement_t) / sizeof *to, PER_STEP);
 }
 
 static void average_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in,

@@ -27,11 +27,13 @@ static inline void identify_add_share(int32_t *to, const int32_t *from, unsigned
 {
     const int32_t *const end = &from[words];
     const int32_t kept = fx_in_register(share); /* else the constant is loaded again for each word */
+    int32_t *sum = to;
+    const int32_t *word = from;
     do {
-        *to = fx_mulhi_add(*to, *from, kept);
-        to++;
-        from++;
-    } while (from != end);
+        *sum = fx_mulhi_add(*sum, *word, kept);
+        sum++;
+        word++;
+    } while (word != end);
 }
 
 #endif
