@@ -40,6 +40,12 @@ void test_too_small_and_too_large_jumps_are_not_of_a_gain(void)
         setUp();
         TEST_ASSERT_FALSE(found(shares[n], 0.0, 0));
     }
+    jump = (current_jump_t){.last = {0, 20000}}; /* 1100 and 1300 counts, above the noise */
+    current_jump_step(&jump, (dq_q15_t){0, 21100});
+    TEST_ASSERT_EQUAL_UINT32(0, jump.jump);
+    jump = (current_jump_t){.last = {0, 20000}};
+    current_jump_step(&jump, (dq_q15_t){0, 21300});
+    TEST_ASSERT_EQUAL_UINT32(650 * 650, jump.jump);
 }
 
 /* An angle that jumps turns the current. */

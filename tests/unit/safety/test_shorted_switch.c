@@ -135,6 +135,14 @@ void test_a_current_that_is_too_small_at_the_end_has_no_direction(void)
                       find(two_upper, (const int[]){MOST, -MOST, 0}, (const int[]){MOST, -I_MIN, 0}));
 }
 
+/* Beyond the rail to which its diode connects a phase, no switch of the bridge can pull it. */
+void test_a_voltage_beyond_the_rails_is_not_of_a_switch(void)
+{
+    const int i[3] = {MOST, -MOST / 2, -MOST / 2};
+    TEST_ASSERT_EQUAL(SHORTED_SWITCH_NONE, find_steady((const double[]){0.0, 1.9, 1.0}, i));
+    TEST_ASSERT_EQUAL(SHORTED_SWITCH_NONE, find_steady((const double[]){-0.9, 1.0, 1.0}, i));
+}
+
 /* No current: every phase has the back-EMF of its magnet, whatever that is. */
 void test_without_current_nothing_is_found(void)
 {
