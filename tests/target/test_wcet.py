@@ -88,7 +88,7 @@ def test_the_passes_of_a_loop_are_counted_each_time_it_is_entered(
     assert seen == {passes}
 
 
-@pytest.mark.parametrize(("key", "most"), [("add_to_mean", 16), ("e2e_crc", 6)])
+@pytest.mark.parametrize(("key", "most"), [("identify_add_share", 16), ("e2e_crc", 6)])
 def test_an_annotation_that_is_too_small_is_found_by_the_emulated_drive(
     measured: Measured, key: str, most: int
 ) -> None:
