@@ -136,6 +136,7 @@ COUNTS = {
     "COMMAND_LOOPS": "loops of the background, longer than any flash command",
     "MEMORY_HOLD_STEPS": "steps in which a save waits for the drive, as firmware/storage/memory.h says",
     "PERIODS_MAX_STEPS": "steps after which the overrun is another fault's",
+    "ECU_FIRST_MS": "time of the transmitted frames in the first step",
     "AFTER_PERIODS": "samples in which current control has taken back a jump of the currents",
     "VOLTAGE_PERIODS": "periods between a sample of the dc voltage and the end of what is computed with it",
     "STOPPED_PERIODS": "of a timer that never runs",
