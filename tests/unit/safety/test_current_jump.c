@@ -101,6 +101,25 @@ void test_a_jump_stands_out_from_what_the_current_does(void)
     TEST_ASSERT_EQUAL_UINT32(1000000, jump.largest);
 }
 
+static uint32_t jump_to(int32_t d, int32_t q)
+{
+    jump = (current_jump_t){.last = {0, 20000}};
+    current_jump_step(&jump, (dq_q15_t){d, q});
+    return jump.jump;
+}
+
+/* A sixteenth and a half of the current, half of the jump across it, and a quarter of the jump afterwards, exactly. */
+void test_at_its_bounds_a_jump_is_not_of_a_gain(void)
+{
+    TEST_ASSERT_EQUAL_UINT32(0, jump_to(0, 21250));
+    TEST_ASSERT_EQUAL_UINT32(0, jump_to(0, 30000));
+    TEST_ASSERT_EQUAL_UINT32(0, jump_to(2000, 24000));
+    TEST_ASSERT_EQUAL_UINT32(2000 * 2000, jump_to(0, 24000));
+    TEST_ASSERT_FALSE(current_jump_stays(&jump, (dq_q15_t){0, 25000}));
+    current_jump_step(&jump, (dq_q15_t){0, 24100});
+    TEST_ASSERT_EQUAL_UINT32(2000 * 2000, jump.largest);
+}
+
 void test_every_current_is_in_range(void)
 {
     for (int n = 0; n < 16; n++) {
