@@ -6,8 +6,7 @@
 #include "safety/current_jump.h"
 
 #define CURRENT_MIN Q15(0.04) /* twice the smallest jump that is found, of full scale */
-#define MOVED_SHIFT 12        /* Q30 to Q18 */
-#define MOVED_LSB 4096U
+#define MOVED_LSB 4096U       /* Q30 to Q18 */
 #define AFTER_PERIODS 8U      /* in which the current must be as quiet after a jump as before it */
 #define VOLTAGE_PERIODS 3U    /* the voltage of a period is computed with the dc voltage of up to two periods before */
 #define VOLTAGE_SHIFT 5       /* a change of the dc voltage by a 32nd explains a jump */
@@ -37,23 +36,11 @@ static bool is_unexplained(const sample_box_t *box, uint32_t at, q16_t gain)
     return fx_mul_gain_q15_word(gain, driven) < moved + moved / 2;
 }
 
-/* (MN-62): noise that begins or grows goes on; the answer of current control moves a third of the jump at most. */
-static bool is_quiet_after(const sample_box_t *box, uint32_t at, const current_jump_t *jump)
-{
-    bool quiet = current_jump_stays(jump, sample_box_at(box, at + 1U)->point.i);
-    current_jump_t on = {.last = sample_box_at(box, at + 1U)->point.i};
-    for (uint32_t n = 2; quiet && n <= AFTER_PERIODS; n++) {
-        current_jump_step(&on, sample_box_at(box, at + n)->point.i);
-        quiet = on.largest <= jump->jump >> 2;
-    }
-    return quiet;
-}
-
-/* The largest change of the current in a step. */
+/* The largest change of the current in some periods. */
 typedef struct {
     uint32_t at;     /* the sample after it */
     uint32_t moved;  /* (|D|/2)^2, Q30 */
-    uint32_t before; /* the largest one of the samples before it in the step */
+    uint32_t before; /* the largest one of those before it */
 } change_t;
 
 static change_t largest_change(const sample_box_t *box, uint32_t first, uint32_t end)
@@ -72,14 +59,20 @@ static change_t largest_change(const sample_box_t *box, uint32_t first, uint32_t
     return largest;
 }
 
-static bool has_jumped(const drive_t *drive, const change_t *change, uint32_t before)
+/* (MN-62): noise that begins or grows goes on; the answer of current control moves a third of the jump at most. */
+static bool is_quiet_after(const sample_box_t *box, const change_t *jump)
+{
+    return largest_change(box, jump->at + 2U, jump->at + AFTER_PERIODS + 1U).moved <= jump->moved >> 2;
+}
+
+static bool has_jumped(const drive_t *drive, const change_t *change)
 {
     const sample_box_t *box = &drive->samples;
-    current_jump_t jump = {
-        .last = sample_box_at(box, change->at - 1U)->point.i, .largest = change->before, .before = before};
-    current_jump_step(&jump, sample_box_at(box, change->at)->point.i);
-    return jump.jump != 0U && is_quiet_after(box, change->at, &jump) && is_voltage_known(box, change->at) &&
-           is_unexplained(box, change->at, drive->motor->plausibility.behind_gain);
+    const uint32_t at = change->at;
+    return current_jump_is_of_gain(sample_box_at(box, at - 1U)->point.i, sample_box_at(box, at)->point.i,
+                                   sample_box_at(box, at + 1U)->point.i) &&
+           is_quiet_after(box, change) && is_voltage_known(box, at) &&
+           is_unexplained(box, at, drive->motor->plausibility.behind_gain);
 }
 
 bool current_gain_has_jumped(drive_t *drive, const snapshot_t *snapshot)
@@ -92,6 +85,7 @@ bool current_gain_has_jumped(drive_t *drive, const snapshot_t *snapshot)
     const uint32_t end = snapshot->generation + 1U - AFTER_PERIODS, first = end - drive->period.periods_per_step;
     const uint32_t before = (uint32_t)task->current_moved_q18 * MOVED_LSB;
     const change_t largest = largest_change(&drive->samples, first, end);
-    task->current_moved_q18 = (uint16_t)fx_usat_bits((int32_t)((largest.moved + MOVED_LSB - 1U) >> MOVED_SHIFT), 16);
-    return current_jump_stands_out(largest.moved, before) && has_jumped(drive, &largest, before);
+    task->current_moved_q18 = (uint16_t)fx_usat_bits((int32_t)((largest.moved + MOVED_LSB - 1U) / MOVED_LSB), 16);
+    return current_jump_stands_out(largest.moved, before) && current_jump_stands_out(largest.moved, largest.before) &&
+           has_jumped(drive, &largest);
 }

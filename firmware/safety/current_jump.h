@@ -11,8 +11,8 @@
  * Units    per unit of the full scale of the current converters
  * Range    every current
  * Rounding half a count of each component of D
- * Errors   returns true if a jump has stayed; the caller knows whether a voltage can have caused it
- * Context  1 kHz task, for each period of a step; no division, no root */
+ * Errors   none; the caller knows whether a voltage can have caused the jump
+ * Context  1 kHz task; no division, no root */
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -20,14 +20,8 @@
 
 #define CURRENT_JUMP_MIN 107374U /* (0.02/2)^2, Q30 */
 
-typedef struct {
-    dq_q15_t last;    /* the sample before */
-    uint32_t largest; /* (|D|/2)^2 of the samples in this step before it, Q30 */
-    uint32_t before;  /* the same of the whole step before */
-    uint32_t jump;    /* (|D|/2)^2 of the sample before if it is a jump, else 0 */
-} current_jump_t;
-
-/** (|D|/2)^2 of two samples in a row, Q30: at most 2^31 for components within 1. */
+/** (|D|/2)^2 of two samples in a row, Q30: at most 2^31 for components within 1. Halved, because the squares must fit
+ * a word. */
 static inline uint32_t current_jump_moved(dq_q15_t last, dq_q15_t now)
 {
     const int32_t d = (now.d - last.d) >> 1, q = (now.q - last.q) >> 1;
@@ -40,10 +34,8 @@ static inline bool current_jump_stands_out(uint32_t moved, uint32_t before)
     return moved > CURRENT_JUMP_MIN && moved >> 2 > before;
 }
 
-/** Whether the sample before was a jump from which this one has not moved. */
-bool current_jump_stays(const current_jump_t *jump, dq_q15_t i);
-
-/** The next sample. */
-void current_jump_step(current_jump_t *jump, dq_q15_t i);
+/** Whether the change from `last` to `i` is along the current, is neither too small nor too large for a gain, and
+ * stays in the next sample. */
+bool current_jump_is_of_gain(dq_q15_t last, dq_q15_t i, dq_q15_t next);
 
 #endif

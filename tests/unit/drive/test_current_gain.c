@@ -75,6 +75,47 @@ void test_what_the_current_did_in_the_step_before_counts(void)
     TEST_ASSERT_FALSE(step(10000));
 }
 
+/* The same in the step of the jump: half of its 2000 counts. A smaller change after the largest one does not
+ * replace it. */
+void test_what_the_current_did_in_the_same_step_counts(void)
+{
+    for (int k = 0; k < 2; k++) {
+        setUp();
+        const uint32_t at = newest - 10U;
+        jump_at(at);
+        for (uint32_t n = newest - 30U; n < at - 1U; n++) {
+            sample(n)->point.i.q += 998 + 4 * k;
+        }
+        for (uint32_t n = at + 2U; n <= newest; n++) {
+            sample(n)->point.i.d += 900;
+        }
+        TEST_ASSERT_EQUAL(k == 0, step(10000));
+        TEST_ASSERT_EQUAL_UINT16(245, drive.task.current_moved_q18); /* 1000^2/4096, rounded up */
+    }
+}
+
+/* The change into the first sample of a step is its first one. */
+void test_what_the_current_did_before_the_last_sample_of_the_step_before_does_not_count(void)
+{
+    jump_at(newest - 10U);
+    for (uint32_t n = newest - 30U; n < newest - AFTER - PERIODS; n++) {
+        sample(n)->point.i.q += 3000;
+    }
+    TEST_ASSERT_TRUE(step(10000));
+}
+
+/* 128^2 are four times 4096. */
+void test_the_largest_change_is_kept_rounded_up(void)
+{
+    for (int more = 0; more < 2; more++) {
+        setUp();
+        sample(newest - 8U)->point.i.d += 256;
+        sample(newest - 8U)->point.i.q += 2 * more;
+        (void)step(10000);
+        TEST_ASSERT_EQUAL_UINT16(4 + more, drive.task.current_moved_q18);
+    }
+}
+
 /* 0.04 of full scale are 1311 counts. Nor does anything stand out in the first step after. */
 void test_small_currents_are_not_compared(void)
 {
@@ -83,6 +124,10 @@ void test_small_currents_are_not_compared(void)
     TEST_ASSERT_FALSE(step(1310));
     TEST_ASSERT_FALSE(step(10000));
     TEST_ASSERT_FALSE(step(10000)); /* the jump itself is now what the step before had */
+    setUp();
+    jump_at(newest - 9U);
+    TEST_ASSERT_FALSE(step(1310));
+    TEST_ASSERT_EQUAL_UINT16(UINT16_MAX, drive.task.current_moved_q18);
 }
 
 /* A 32nd of 16000 are 500; more, and the acting voltage was wrong. */
@@ -128,7 +173,8 @@ void test_a_current_that_is_not_quiet_after_it_has_not_jumped(void)
         uint32_t after;
         int32_t change;
         bool found;
-    } cases[] = {{1, 498, true}, {1, 502, false}, {2, 1000, true}, {2, 1004, false}, {7, 1004, false}, {9, 1500, true}};
+    } cases[] = {{1, 498, true},   {1, 502, false},  {2, 1000, true}, {2, 1004, false},
+                 {7, 1004, false}, {8, 1004, false}, {9, 1500, true}};
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         setUp();
         const uint32_t at = newest - 10U;
@@ -151,6 +197,10 @@ void test_a_voltage_that_explains_the_jump_counts(void)
         sample(at - 1U)->point.u.q = largest + 20 * (2 * k - 1);
         TEST_ASSERT_EQUAL(k == 0, step(10000));
     }
+    setUp();
+    jump_at(newest - 10U);
+    sample(newest - 12U)->point.u = sample(newest - 11U)->point.u = (dq_q15_t){largest, largest};
+    TEST_ASSERT_TRUE(step(10000)); /* a voltage that has not changed drives no current */
     setUp();
     jump_at(newest - 10U);
     sample(newest - 11U)->pulses_clamped = true;
