@@ -500,6 +500,20 @@ void test_the_drop_of_the_whole_resistance_is_allowed_across_the_back_emf(void)
     TEST_ASSERT_TRUE(angle_found(&c, 5300, 0, 16384));
 }
 
+/* The same at i_q = 0.5 along it: e_q = u_q - 1638 may be 3500 + 1638. */
+void test_the_drop_of_the_whole_resistance_is_allowed_along_the_back_emf(void)
+{
+    torque_monitor_config_t c = exact;
+    c.psi_f = 20000;
+    c.r = 6554 << 15;
+    for (int beyond = 0; beyond < 2; beyond++) {
+        const int32_t u_q = 6700 + 150 * beyond;
+        in = (torque_monitor_in_t){
+            .u = {0, u_q}, .u_mean = {0, u_q}, .i = {0, 16384}, .omega = 16384, .winding_dC = 200};
+        TEST_ASSERT_EQUAL(beyond > 0, (faults_at(&c, 0) & FAULT_ANGLE_OFFSET) != 0U);
+    }
+}
+
 /* Settling begins when the bridge begins to act, whatever was before. */
 void test_the_first_decision_is_that_of_the_step_after_settling(void)
 {
