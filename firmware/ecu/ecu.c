@@ -32,7 +32,6 @@ void ecu_init(ecu_t *ecu, const motor_t *source)
 {
     const q31_t full = source->torque_max * 65536;
     *ecu = (ecu_t){0};
-    ecu->tx.time_ms = ECU_FIRST_MS;
     step_clock_start(&ecu->clock, (uint32_t)(source->bases.step_s * 1e9F + 0.5F));
     drive_init(&ecu->drive, source);
     xcp_access_init(&ecu->xcp, &ecu->drive, &ecu->freeze, &ecu->scope, (uint32_t)hal_system_reset_cause());

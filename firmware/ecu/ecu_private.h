@@ -12,10 +12,6 @@
 #include "signal/program_flow.h"
 #include "types/torque_limits.h"
 
-/* Time of the transmitted frames in the first step. The identification updates its filter in the tenth step and the two
- * after it; these miss the frames of 10 ms (phases 0 to 4 ms), so that no step does both. */
-#define ECU_FIRST_MS 6U
-
 /* Checks that the interrupts advance and that the task is in time; once per step. */
 void ecu_watch(ecu_t *ecu);
 /* Converts what the bus commands to per unit, if a frame has been taken or no command is valid. */

@@ -135,7 +135,6 @@ def test_a_fault_under_torque_ends_in_fault_with_no_torque_and_is_told(
     rig: Rig, cause: dict[str, Any], drive: int, ecu: int
 ) -> None:
     rig.expected.faults = True
-    rig.turn(300.0)  # at rest a sensor that is off by 60 A is also a wrong zero after 50 ms (MN-38)
     rig.start(40.0)
     rig.advance(0.2)
     rig.stand.set(**cause)
