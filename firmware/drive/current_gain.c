@@ -8,6 +8,7 @@
 #define CURRENT_MIN Q15(0.04) /* twice the smallest jump that is found, of full scale */
 #define MOVED_LSB 4096U       /* Q30 to Q18 */
 #define AFTER_PERIODS 8U      /* in which the current must be as quiet after a jump as before it */
+#define BEFORE_PERIODS 8U     /* in which no pulse may have been clamped and no voltage limited */
 #define VOLTAGE_PERIODS 3U    /* the voltage of a period is computed with the dc voltage of up to two periods before */
 #define VOLTAGE_SHIFT 5       /* a change of the dc voltage by a 32nd explains a jump */
 
@@ -16,13 +17,24 @@ static bool is_near(int32_t v_dc, int32_t reference)
     return fx_abs_q31(v_dc - reference) <= reference >> VOLTAGE_SHIFT;
 }
 
+/* Clamped pulses and a limited voltage move the current, and the answer of current control goes on for some periods. */
+static bool is_unlimited(const sample_box_t *box, uint32_t at)
+{
+    bool unlimited = true;
+    for (uint32_t n = 1; unlimited && n <= BEFORE_PERIODS; n++) {
+        const sample_t *sample = sample_box_at(box, at - n);
+        unlimited = !sample->pulses_clamped && !sample->voltage_limited;
+    }
+    return unlimited;
+}
+
 /* (MN-59): the bridge has followed current control all the time, and its voltage was what the duties say. */
 static bool is_voltage_known(const sample_box_t *box, uint32_t at)
 {
     const sample_t *now = sample_box_at(box, at), *next = sample_box_at(box, at + 1U);
     const sample_t *before = sample_box_at(box, at - VOLTAGE_PERIODS);
-    return before->acting && now->acting && next->acting && !sample_box_at(box, at - 1U)->pulses_clamped &&
-           is_near(before->v_dc, now->v_dc) && is_near(next->v_dc, now->v_dc);
+    return before->acting && now->acting && next->acting && is_near(before->v_dc, now->v_dc) &&
+           is_near(next->v_dc, now->v_dc) && is_unlimited(box, at);
 }
 
 /* (MN-61): the voltage of the period before the jump, less that of the period before it, would have moved the current

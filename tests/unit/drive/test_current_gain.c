@@ -201,8 +201,19 @@ void test_a_voltage_that_explains_the_jump_counts(void)
     jump_at(newest - 10U);
     sample(newest - 12U)->point.u = sample(newest - 11U)->point.u = (dq_q15_t){largest, largest};
     TEST_ASSERT_TRUE(step(10000)); /* a voltage that has not changed drives no current */
-    setUp();
-    jump_at(newest - 10U);
-    sample(newest - 11U)->pulses_clamped = true;
-    TEST_ASSERT_FALSE(step(10000));
+}
+
+/* A voltage that is limited moves the current, and so does the answer of current control to it. */
+void test_a_limited_voltage_in_the_eight_periods_before_counts(void)
+{
+    for (uint32_t n = 0; n <= 9U; n++) {
+        setUp();
+        jump_at(newest - 10U);
+        sample(newest - 10U - n)->pulses_clamped = true;
+        TEST_ASSERT_EQUAL(n == 0U || n > 8U, step(10000));
+        setUp();
+        jump_at(newest - 10U);
+        sample(newest - 10U - n)->voltage_limited = true;
+        TEST_ASSERT_EQUAL(n == 0U || n > 8U, step(10000));
+    }
 }
