@@ -169,7 +169,6 @@ typedef struct {
     rotating_flux_t rotating;    /* whose rotational voltage the target makes (CC-25) */
     dead_time_trim_state_t trim; /* of the compensation: added while driving */
     uint16_t derating;           /* DERATING_...: reasons for less than the requested torque */
-    uint16_t current_moved_q18;  /* largest change of the current in a period of the last step, (|D|/2)^2, rounded up */
     q15_t torque_commanded;      /* the limited torque after slew */
     q15_t torque_corrected;      /* after the torque loop: input of the current reference */
     run_state_t run_state;

@@ -2,7 +2,6 @@
 #include "drive/slow_monitors.h"
 
 #include "control/current/transform.h"
-#include "drive/current_gain.h"
 #include "fx/codegen.h"
 
 static inline FX_INLINED_IF_OPTIMISED abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
@@ -208,7 +207,6 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
     }
     const bool behind = u_behind > drive->motor->torque_monitor.v_lag;
     uint32_t faults = of_currents | check_torque(drive, snapshot) | shorted;
-    faults |= current_gain_has_jumped(drive, snapshot) ? (uint32_t)FAULT_INPUT : 0U;
     faults |= check_angle(drive, snapshot, phases.reference, acting, behind);
     faults |= check_launch(drive, snapshot, acting, behind);
     update_short_side(drive, snapshot, &phases);

@@ -6,8 +6,9 @@
  *   e > share_short v_dc: short circuit, because the diodes could otherwise rectify the back-EMF into the battery and
  *   brake; e < share_open v_dc: switching disabled; between both levels the last decision holds; without a valid speed
  *   share_open is the only one
- *   The diodes may conduct by the same levels, the upper one being v_dc at most: above v_dc they do, in short pulses
- *   that brake less than the short circuit.
+ *   That the diodes may conduct is decided in the same way, with a share of 1 in place of a larger share_short, and
+ *   with share_open reduced by as much: from v_dc on they conduct in short pulses that brake less than the short
+ *   circuit.
  *   v_dc is the known dc voltage. It rises with the measured one and falls with a time constant of 64 steps. While a
  *   fault is latched or the converters' reference reads wrong, it falls only if a current has flowed for 10 steps
  *   although switching is disabled: a failed sensor reads as an empty dc link does, but only the empty link draws a

@@ -476,6 +476,36 @@ void test_a_change_of_just_the_threshold_is_none(void)
     }
 }
 
+/* r = 150 and r_0 = 200 after the step: 362/128 of hypot(75, 100) are 353 counts. */
+void test_a_change_of_just_the_noise_is_none(void)
+{
+    for (int beyond = 0; beyond <= 1; beyond++) {
+        in.i_ref = (dq_q15_t){0, 13107};
+        state = (launch_power_state_t){.i_ref = {0, 13107},
+                                       .steady = SETTLED + EARLY,
+                                       .noise_q8 = 160 * 256,
+                                       .first_noise_q8 = 200 * 256 + 10,
+                                       .first_power_q8 = -(353 + beyond) * 256 - 100};
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+        TEST_ASSERT_EQUAL_UINT8(beyond, state.wrong);
+    }
+}
+
+/* A change of the speed by 2309 counts: the tables' flux may be wrong by 0.088, which is 41 counts of the power more
+ * than the 106 without it. */
+void test_the_error_of_the_tables_is_added_to_the_threshold(void)
+{
+    for (int beyond = 0; beyond <= 1; beyond++) {
+        in.i_ref = (dq_q15_t){0, 13107};
+        state = (launch_power_state_t){.i_ref = {0, 13107},
+                                       .steady = SETTLED + EARLY,
+                                       .first_omega_q8 = -2310 * 256,
+                                       .first_power_q8 = -(147 + beyond) * 256 - 50};
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+        TEST_ASSERT_EQUAL_UINT8(beyond, state.wrong);
+    }
+}
+
 void test_no_argument_wraps(void)
 {
     static const int32_t ends[] = {-43 * 32768, 43 * 32767};
