@@ -464,15 +464,22 @@ void test_means_and_decisions_are_those_of_the_twin(void)
     TEST_ASSERT_TRUE(compared[0] > 10000 && compared[1] > 10000);
 }
 
+/* One step with a current of 13107 on the q axis from this state; the threshold is exceeded or just not. */
+static void expect_wrong(bool beyond, launch_power_state_t from)
+{
+    in.i_ref = (dq_q15_t){0, 13107};
+    state = from;
+    state.i_ref = (dq_q15_halfword_t){0, 13107};
+    TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    TEST_ASSERT_EQUAL_UINT8(beyond, state.wrong);
+}
+
 /* The threshold is 530/65536 of a current of 13107: 106 counts. The reference of the mean follows by 6/256 in the step:
  * 27142/4096. */
 void test_a_change_of_just_the_threshold_is_none(void)
 {
     for (int beyond = 0; beyond <= 1; beyond++) {
-        in.i_ref = (dq_q15_t){0, 13107};
-        state = (launch_power_state_t){.first_power_q8 = -27142 - 256 * beyond, .i_ref = {0, 13107}, .steady = SETTLED};
-        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
-        TEST_ASSERT_EQUAL_UINT8(beyond, state.wrong);
+        expect_wrong(beyond, (launch_power_state_t){.steady = SETTLED, .first_power_q8 = -27142 - 256 * beyond});
     }
 }
 
@@ -480,14 +487,10 @@ void test_a_change_of_just_the_threshold_is_none(void)
 void test_a_change_of_just_the_noise_is_none(void)
 {
     for (int beyond = 0; beyond <= 1; beyond++) {
-        in.i_ref = (dq_q15_t){0, 13107};
-        state = (launch_power_state_t){.i_ref = {0, 13107},
-                                       .steady = SETTLED + EARLY,
-                                       .noise_q8 = 160 * 256,
-                                       .first_noise_q8 = 200 * 256 + 10,
-                                       .first_power_q8 = -(353 + beyond) * 256 - 100};
-        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
-        TEST_ASSERT_EQUAL_UINT8(beyond, state.wrong);
+        expect_wrong(beyond, (launch_power_state_t){.steady = SETTLED + EARLY,
+                                                    .noise_q8 = 160 * 256,
+                                                    .first_noise_q8 = 200 * 256 + 10,
+                                                    .first_power_q8 = -(353 + beyond) * 256 - 100});
     }
 }
 
@@ -496,13 +499,9 @@ void test_a_change_of_just_the_noise_is_none(void)
 void test_the_error_of_the_tables_is_added_to_the_threshold(void)
 {
     for (int beyond = 0; beyond <= 1; beyond++) {
-        in.i_ref = (dq_q15_t){0, 13107};
-        state = (launch_power_state_t){.i_ref = {0, 13107},
-                                       .steady = SETTLED + EARLY,
-                                       .first_omega_q8 = -2310 * 256,
-                                       .first_power_q8 = -(147 + beyond) * 256 - 50};
-        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
-        TEST_ASSERT_EQUAL_UINT8(beyond, state.wrong);
+        expect_wrong(beyond, (launch_power_state_t){.steady = SETTLED + EARLY,
+                                                    .first_omega_q8 = -2310 * 256,
+                                                    .first_power_q8 = -(147 + beyond) * 256 - 50});
     }
 }
 
