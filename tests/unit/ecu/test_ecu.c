@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "calibration/calibration.h"
+#include "dc_sensor_sample.h"
 #include "drive/data_check.h"
 #include "ecu/ecu_private.h"
 #include "ecu_bench.h"
@@ -116,6 +117,16 @@ void test_the_vehicles_limits_reach_the_drive_in_the_same_step(void)
     tasks(1);
     TEST_ASSERT_EQUAL_INT(0, ecu.drive.request.limits.torque_drive);
     TEST_ASSERT_EQUAL_INT(0, ecu.drive.request.limits.torque_regen);
+}
+
+/* The conversion is in floating point: a step without a frame does not need its time. */
+void test_a_step_without_a_frame_keeps_the_commands_that_were_converted_with_the_last_one(void)
+{
+    ecu.rx.command_channel.alive = true;
+    ecu_seal_flags(&ecu);
+    ecu.rx.command.torque_requested_Nm = 29.4664F;
+    tasks(1);
+    TEST_ASSERT_EQUAL_INT(0, ecu.commanded.torque_requested);
 }
 
 /* 132 N·m are 14679 counts, 962002944 in q31. The slew makes this in 40 ms, the jerk makes the full rate in 10 ms, the
@@ -494,6 +505,26 @@ void test_torque_that_no_frame_permits_is_a_fault_of_the_drive(void)
     TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE,
                             ecu.drive.commands.slot[ecu.drive.commands.generation & 1U].faults & FAULT_TORQUE);
     TEST_ASSERT_EQUAL_HEX32(0, ecu.drive.request.faults);
+}
+
+static uint32_t latched_after_step_with_dc_gain(double gain)
+{
+    *sample_box_begin(&ecu.drive.samples) = sample_with_dc_gain(gain);
+    sample_box_publish(&ecu.drive.samples);
+    ecu_task_1khz(&ecu);
+    return ecu.drive.commands.slot[ecu.drive.commands.generation & 1U].faults;
+}
+
+/* The drive latches it in the same step, the eighth of the wrong gain. */
+void test_a_dc_voltage_sensor_whose_gain_jumps_is_a_fault_of_the_drive(void)
+{
+    for (int n = 0; n < 10; n++) {
+        latched_after_step_with_dc_gain(1.0);
+    }
+    for (int n = 0; n < 7; n++) {
+        TEST_ASSERT_EQUAL_HEX32(0, latched_after_step_with_dc_gain(1.2) & FAULT_INPUT);
+    }
+    TEST_ASSERT_EQUAL_HEX32(FAULT_INPUT, latched_after_step_with_dc_gain(1.2) & FAULT_INPUT);
 }
 
 /* The angle is not that of the second level's data, and the currents are those of a protected message. */

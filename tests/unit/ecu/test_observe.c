@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "dc_sensor_sample.h"
 #include "ecu/ecu_private.h"
 #include "hal/mock_angle.h"
 #include "hal/mock_can.h"
@@ -6,7 +7,6 @@
 #include "unity.h"
 
 /* hsm1: V_b = 540 V, I_b = 400 A, T_b = 294.664 N·m, omega_b = 3298.6724 rad/s, torque_max = 132 N·m, 3 pole pairs. */
-#define COUNT_PER_V (32768.0 / 540.0)
 #define TORQUE_MAX 14679
 #define US 1000U
 
@@ -365,22 +365,14 @@ void test_the_dc_voltage_sensor_is_compared_while_the_commanded_torque_is_steady
     }
 }
 
-/* The sensor reads so many times the voltage, and the drive computes the acting voltage from it. */
 static void read_dc(double gain)
 {
-    sample.v_dc = (int32_t)(gain * 350.0 * COUNT_PER_V);
-    sample.point.u.q = (int32_t)(gain * 7000.0);
-    *sample_box_begin(&ecu.drive.samples) = sample;
-    sample_box_publish(&ecu.drive.samples);
-    ecu_check_dc_sensor(&ecu);
+    sample = sample_with_dc_gain(gain);
+    check_dc_sensor();
 }
 
 void test_a_dc_voltage_sensor_whose_gain_jumps_is_an_input_fault_in_the_eighth_step(void)
 {
-    sample.acting = true;
-    sample.point.omega = 1 << 30;
-    sample.point.i.q = 9000;
-    sample.point.flux.psi_d = 14000;
     ecu.drive.task.torque_monitor.psi.d = 14000;
     for (int n = 0; n < 6; n++) {
         read_dc(1.0);
