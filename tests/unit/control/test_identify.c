@@ -202,6 +202,37 @@ void test_an_update_is_spread_over_three_steps(void)
     }
 }
 
+/* An update seals what it has computed: damage that came before must be seen first, or it is sealed with the rest. */
+void test_damaged_parameters_are_seen_before_each_part_of_an_update(void)
+{
+    for (int step = 10; step <= 12; step++) {
+        identify_reset(&c, &state);
+        run((dq_q15_t){-4000, 8000}, 0.4, nominal, step - 1);
+        TEST_ASSERT_FALSE(state.damaged);
+        state.kalman.x_q27[IDENTIFY_LQ] ^= 1 << 20;
+        run((dq_q15_t){-4000, 8000}, 0.4, nominal, 1);
+        TEST_ASSERT_TRUE(state.damaged);
+    }
+}
+
+/* Without current and speed the noise is that of the voltage alone. Each step's tenth is rounded by half a count. */
+void test_the_mean_of_ten_equal_steps_is_their_value_within_half_a_count_each(void)
+{
+    c.noise_voltage_q30 = IDENTIFY_ONE_Q30 - 10;
+    run((dq_q15_t){0, 0}, 0.0, nominal, 10);
+    TEST_ASSERT_INT32_WITHIN(5, c.noise_voltage_q30, state.mean.noise_q30);
+}
+
+/* Four standard deviations of a half. */
+void test_the_value_of_a_parameter_is_limited_to_the_range_of_the_format(void)
+{
+    c.sigma[IDENTIFY_DROP] = 1 << 30;
+    identify_set(&state, IDENTIFY_DROP, 4 * IDENTIFY_ONE_Q27);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, 1.0, value(IDENTIFY_DROP));
+    identify_set(&state, IDENTIFY_DROP, -4 * IDENTIFY_ONE_Q27);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, -1.0, value(IDENTIFY_DROP));
+}
+
 /* 0.39 % per kelvin: 39 % more at 120 C. */
 void test_the_winding_temperature_sets_the_prior_resistance_and_a_lost_sensor_keeps_it(void)
 {
@@ -244,20 +275,40 @@ void test_the_confidence_starts_at_zero_and_rises_within_half_a_second_after_ide
     TEST_ASSERT_EQUAL_INT(Q15_MAX, state.kept.confidence);
 }
 
-/* Variance of the torque at this operating point relative to that with the tables alone, from the twin's covariance. */
-static double relative_variance(dq_q15_t i, double omega)
+typedef struct {
+    double posterior, prior; /* (Vs A)^2 */
+} variances_t;
+
+/* Variance of the torque at this operating point, and with the tables alone, from the twin's covariance. */
+static variances_t torque_variances(dq_q15_t i, double omega)
 {
     const window_pair_t pair = steady_window(&f, i, omega, (dq_q15_t){0, 0});
     const twin_point_t point = twin_point(&f.si, &pair.twin, omega * f.w);
     const twin_model_t m = twin_model(&f.si, &point, f.si.r_ohm_20);
-    double posterior = 0.0, prior = 0.0;
+    variances_t v = {0.0, 0.0};
     for (int j = 0; j < TWIN_STATES; j++) {
-        prior += m.torque[j] * m.torque[j];
+        v.prior += m.torque[j] * m.torque[j];
         for (int l = 0; l < TWIN_STATES; l++) {
-            posterior += m.torque[j] * twin.kalman.p[j][l] * m.torque[l];
+            v.posterior += m.torque[j] * twin.kalman.p[j][l] * m.torque[l];
         }
     }
-    return posterior / prior;
+    return v;
+}
+
+static double relative_variance(dq_q15_t i, double omega)
+{
+    const variances_t v = torque_variances(i, omega);
+    return v.posterior / v.prior;
+}
+
+/* Compared in the third step of an update, in which it is computed. */
+void test_the_variance_of_the_torque_is_stated_after_the_first_update(void)
+{
+    const dq_q15_t i = {-4000, 8000};
+    TEST_ASSERT_EQUAL_INT32(Q31_MAX, state.torque_variance_q30); /* unknown */
+    run(i, 0.3, nominal, 3012);
+    const double expected = torque_variances(i, 0.3).posterior / (f.psi * f.i * f.psi * f.i);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01 * expected, expected, state.torque_variance_q30 / (double)IDENTIFY_ONE_Q30);
 }
 
 /* A torque of zero is certain whatever the parameters are; this must not raise the confidence for the torque that
@@ -389,6 +440,90 @@ void test_a_limit_that_the_d_axis_alone_has_reached_counts_as_a_mismatch(void)
     TEST_ASSERT_GREATER_THAN_INT(0, state.kept.mismatch_share);
 }
 
+void test_a_limit_that_no_axis_reaches_any_more_is_cleared_by_the_next_update(void)
+{
+    run((dq_q15_t){-4000, 8000}, 0.5, nominal, 3005);
+    state.kept.clamped = true;
+    identify_seal_kept(&state);
+    run((dq_q15_t){-4000, 8000}, 0.5, nominal, 5);
+    TEST_ASSERT_FALSE(state.kept.clamped); /* by the d axis */
+    run((dq_q15_t){-4000, 8000}, 0.5, nominal, 1);
+    TEST_ASSERT_FALSE(state.kept.clamped); /* by the q axis */
+}
+
+/* 0.1 of it in each update: 16385 - 3277 * 16385 / 32768 = 16385 - 1638.6. */
+void test_a_good_update_reduces_the_share_of_mismatches_by_its_rate(void)
+{
+    run((dq_q15_t){-4000, 8000}, 0.5, nominal, 3010);
+    state.kept.mismatch_share = 16385;
+    identify_seal_kept(&state);
+    run((dq_q15_t){-4000, 8000}, 0.5, nominal, 1);
+    TEST_ASSERT_EQUAL_INT(14746, state.kept.mismatch_share);
+}
+
+/* The share is set before the third step of an update, which compares it. */
+void test_up_to_half_of_the_updates_may_be_mismatches(void)
+{
+    run((dq_q15_t){-4000, 8000}, 0.5, nominal, 3011);
+    for (int beyond = 0; beyond < 2; beyond++) {
+        TEST_ASSERT_TRUE(state.kept.torque_certain);
+        state.kept.mismatch_share = (q15_t)(Q15(0.5) + beyond);
+        identify_seal_kept(&state);
+        run((dq_q15_t){-4000, 8000}, 0.5, nominal, 1);
+        TEST_ASSERT_EQUAL(beyond == 0, state.kept.torque_certain);
+        run((dq_q15_t){-4000, 8000}, 0.5, nominal, 9);
+    }
+}
+
+/* The torque's change with the scale of the q axis' inductance, Q30: the only uncertain parameter. */
+static int32_t torque_by_lq_alone(const identify_in_t *in)
+{
+    identify_model_t model;
+    jacobian_row_t row;
+    identify_model(&c, in->point, in->tables, state.kept.r_prior, &model);
+    identify_torque_row(&c, &model, &row);
+    return fx_abs_q31(row.h_q30[IDENTIFY_LQ]);
+}
+
+/* Whether the torque stays certain with this variance of the q axis' inductance, relative to its prior. */
+static bool stays_certain(const identify_in_t *in, int32_t variance_q30)
+{
+    identify_reset(&c, &state);
+    state.kalman = (kalman_t){{0}, {0}};
+    state.kalman.p_q30[kalman_p_index(IDENTIFY_LQ, IDENTIFY_LQ)] = variance_q30;
+    state.kept.torque_certain = true;
+    identify_seal(&state);
+    (void)identify_step(&c, &state, in);
+    (void)identify_step(&c, &state, in);
+    TEST_ASSERT_FALSE(state.damaged);
+    return state.kept.torque_certain;
+}
+
+/* Three quarters of the prior's variance, and the deviation that is large against the torque: at either bound itself
+ * the last decision holds. With a multiple of 4096 and without leak both are exact. */
+void test_the_torque_becomes_uncertain_above_both_bounds_of_its_variance_and_not_at_them(void)
+{
+    const window_pair_t pair = steady_window(&f, (dq_q15_t){-4000, 4000}, 0.3, (dq_q15_t){0, 0});
+    const identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(0.3 * 2147483647.0));
+    const identify_tables_t tables = tables_at(&f, point.i_m);
+    const identify_in_t in = {&point, &tables, TEMPERATURE_UNKNOWN, false};
+    const q31_t sigma = c.sigma[IDENTIFY_LQ];
+    memset(c.sigma, 0, sizeof c.sigma);
+    memset(c.leak, 0, sizeof c.leak);
+    c.sigma[IDENTIFY_LQ] = sigma;
+    while (torque_by_lq_alone(&in) % 4096 != 0) {
+        c.sigma[IDENTIFY_LQ]++;
+    }
+    c.confidence_full = c.confidence_none = c.torque_min = 1;
+    TEST_ASSERT_TRUE(stays_certain(&in, IDENTIFY_ONE_Q30 / 4 * 3));
+    TEST_ASSERT_FALSE(stays_certain(&in, IDENTIFY_ONE_Q30 / 4 * 3 + 4096));
+    c.torque_min = 4096;
+    c.confidence_none = (q15_t)(torque_by_lq_alone(&in) / 4096);
+    TEST_ASSERT_TRUE(stays_certain(&in, IDENTIFY_ONE_Q30));
+    c.confidence_none--;
+    TEST_ASSERT_FALSE(stays_certain(&in, IDENTIFY_ONE_Q30));
+}
+
 /* With nothing identified the standard deviation of the torque is about a tenth of it. This is below a level of one
  * half, except without torque. */
 void test_the_confidence_also_rises_if_the_uncertainty_is_small_relative_to_the_torque(void)
@@ -417,6 +552,30 @@ void test_the_weight_of_the_local_flux_error_rises_with_speed(void)
         run((dq_q15_t){-4000, 8000}, w, (truth_t){-0.02, 1.0, 0.0}, 200);
         const double share = w * w / (w * w + corner * corner);
         TEST_ASSERT_DOUBLE_WITHIN(5e-4, -0.02 * share * settled, from_q31(state.kept.local.d) * 2.0);
+    }
+}
+
+/* w/(w^2 + w_x^2) of 98 counts of q15 would be 334: the square is at least one count, which limits it to 98. */
+void test_the_gain_of_the_local_flux_error_is_limited_at_very_low_speed(void)
+{
+    const double w = 98.0 / 32768.0;
+    c.noise_voltage_q30 = INT32_MAX;
+    c.omega_min = c.local_corner = 1;
+    run((dq_q15_t){-4000, 8000}, w, (truth_t){-0.5, 1.0, 0.0}, 200);
+    const double settled = 1.0 - pow(0.95, 200.0);
+    TEST_ASSERT_DOUBLE_WITHIN(5e-3, 98.0 * w * -0.5 * settled, from_q31(state.kept.local.d) * 2.0);
+}
+
+/* Rounding of half a count stops the filter of 0.05 ten counts from its end. */
+void test_without_a_valid_window_the_local_flux_error_returns_to_zero(void)
+{
+    enabled = false;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        state.kept.local = (dq_q30_t){sign * (1 << 20), sign * (1 << 20)};
+        identify_seal_kept(&state);
+        run((dq_q15_t){-4000, 8000}, 0.5, nominal, 1000);
+        TEST_ASSERT_INT32_WITHIN(10, 0, state.kept.local.d);
+        TEST_ASSERT_INT32_WITHIN(10, 0, state.kept.local.q);
     }
 }
 
