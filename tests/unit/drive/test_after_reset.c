@@ -115,3 +115,13 @@ void test_the_drive_goes_on_with_the_short_circuit(void)
     TEST_ASSERT_TRUE(drive.task.safe_state.line_emf > volts(315.0F));
     TEST_ASSERT_TRUE(drive.task.armed && drive.task.safe_state.short_circuit);
 }
+
+/* Between the levels the diodes may conduct already before the reset: the supply of the short circuit stays on. */
+void test_the_drive_goes_on_with_diodes_that_conduct_down_to_the_lower_level(void)
+{
+    after_reset_hold(&drive, &before, speed_of(7300.0F));
+    TEST_ASSERT_TRUE(drive.task.safe_state.rectifies && drive.task.safe_state.short_circuit);
+    setUp();
+    after_reset_hold(&drive, &before, speed_of(7000.0F));
+    TEST_ASSERT_FALSE(drive.task.safe_state.rectifies || drive.task.safe_state.short_circuit);
+}
