@@ -117,6 +117,18 @@ void test_a_step_compares_four_words(void)
     TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, data_check_step(&drive));
 }
 
+/* Of a damaged position the comparison would read what lies behind the data. */
+void test_a_position_behind_the_data_compares_the_last_words_and_begins_a_new_round(void)
+{
+    const size_t words = (offsetof(drive_t, data_check.options) - offsetof(drive_t, data_check)) / sizeof(uint32_t);
+    drive.data_check.at = (uint32_t)words;
+    TEST_ASSERT_EQUAL_HEX32(0, data_check_step(&drive));
+    TEST_ASSERT_EQUAL_UINT32(0, drive.data_check.at);
+    flip(LIVE_END - sizeof(uint32_t), 0);
+    drive.data_check.at = (uint32_t)words;
+    TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, data_check_step(&drive));
+}
+
 void test_a_change_of_the_trim_hides_no_damage_of_other_parameters_or_of_the_word_behind_them(void)
 {
     const size_t damaged[] = {offsetof(drive_t, parameters.torque_slew), offsetof(drive_t, mrai_parameters)};
