@@ -89,6 +89,17 @@ void test_each_phase_is_compared_with_its_own_reference(void)
     }
 }
 
+/* (MN-43): 8000 * 30,000/2^15 = 7324 of missing rotational voltage, and as much current: more than the reference. */
+void test_no_phase_is_lost_while_the_tracked_speed_is_far_behind(void)
+{
+    seam.motor.plausibility.behind_gain = Q16_ONE;
+    drive.task.psi_ref = (dq_q15_t){30000, 0};
+    snapshot.lag = 8000;
+    TEST_ASSERT_EQUAL_HEX32(0, faults_without(0) & FAULT_PHASE_LOST);
+    snapshot.lag = 0;
+    TEST_ASSERT_EQUAL_HEX32(FAULT_PHASE_LOST, faults_without(0) & FAULT_PHASE_LOST);
+}
+
 static uint32_t faults_of_a_wrong_zero(bool acting, bool gates, q31_t omega)
 {
     setUp();
@@ -205,9 +216,8 @@ void test_the_power_of_the_resistance_at_the_winding_s_temperature_is_no_torque(
     TEST_ASSERT_INT32_WITHIN(3, 610, deviation_with(1403)); /* 1000 * 20,000/2^15 */
 }
 
-/* Whether the upper switches are chosen after so many steps in which phase a of the sample half a step before has a
- * constant part of five times i_dead. The other samples of the step have none. */
-static bool is_upper(q31_t omega, bool acting, uint32_t steps)
+/* Phase a of the sample half a step before has a constant part of five times i_dead. */
+static void start_side(q31_t omega, bool acting)
 {
     setUp();
     snapshot.generation = 100;
@@ -216,6 +226,13 @@ static bool is_upper(q31_t omega, bool acting, uint32_t steps)
     const int32_t constant = 5 * seam.motor.plausibility.i_dead;
     drive.samples.slot[95 % SAMPLE_SLOTS] = snapshot.sample;
     drive.samples.slot[95 % SAMPLE_SLOTS].i_ab += (fx_pair_t)constant; /* alpha */
+}
+
+/* Whether the upper switches are chosen after so many steps of it. The other samples of the step have no constant
+ * part. */
+static bool is_upper(q31_t omega, bool acting, uint32_t steps)
+{
+    start_side(omega, acting);
     for (uint32_t n = 0; n < steps; n++) {
         (void)slow_monitors_step(&drive, &snapshot);
     }
@@ -229,6 +246,17 @@ void test_the_sample_half_a_step_before_counts_for_the_side_of_a_short_circuit(v
     TEST_ASSERT_FALSE(is_upper(Q31(0.3), true, 4));
     TEST_ASSERT_FALSE(is_upper(Q31(0.3), false, 40));
     TEST_ASSERT_FALSE(is_upper(Q31(0.02), true, 40));
+}
+
+/* Its phase currents are not controlled. */
+void test_a_sample_half_a_step_before_that_did_not_switch_does_not_count_for_the_side(void)
+{
+    start_side(Q31(0.3), true);
+    drive.samples.slot[95 % SAMPLE_SLOTS].acting = false;
+    for (int n = 0; n < 40; n++) {
+        (void)slow_monitors_step(&drive, &snapshot);
+        TEST_ASSERT_INT32_WITHIN(2 * 256, 0, drive.task.short_side.a_q8);
+    }
 }
 
 static bool is_upper_after(bool shorted, uint32_t faults)
@@ -344,16 +372,16 @@ void test_the_voltage_that_changes_the_flux_is_removed(void)
     TEST_ASSERT_INT32_WITHIN(1, 7000 + 6063, drive.task.frozen_angle.u_standing.q);
 }
 
-/* 200 * 10,000/2^15 = 61 is above v_lag = 42, 100 * 10,000/2^15 is not. */
+/* 140 * 10,000/2^15 = 43 is above v_lag = 42, 138 * 10,000/2^15 = 42 is not. */
 void test_while_the_tracked_speed_is_behind_the_comparisons_begin_anew(void)
 {
     drive.task.psi_ref = (dq_q15_t){10000, 0};
     steps(6);
-    snapshot.lag = 100;
+    snapshot.lag = 138;
     step();
     TEST_ASSERT_EQUAL_UINT8(6, drive.task.frozen_angle.standing);
     TEST_ASSERT_EQUAL_UINT8(6, drive.task.launch_power.steady);
-    snapshot.lag = -200;
+    snapshot.lag = -140;
     step();
     TEST_ASSERT_EQUAL_UINT8(1, drive.task.frozen_angle.standing);
     TEST_ASSERT_EQUAL_UINT8(1, drive.task.launch_power.steady);
