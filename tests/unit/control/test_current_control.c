@@ -139,6 +139,15 @@ void test_the_target_of_every_reference_follows_the_twin(void)
     ASSERT_WORST(worst, 6.0);
 }
 
+/* Flux and rotational part are together almost two per unit, with the sign of the speed. */
+void test_the_reference_of_the_proportional_part_is_limited_to_one(void)
+{
+    const flux_point_t at = {.psi_d = 32000, .psi_q = 32000, .psi_f0 = 32000};
+    const flux_point_t opposite = {.psi_d = 32000, .psi_q = -32000, .psi_f0 = 32000};
+    TEST_ASSERT_EQUAL_INT32((1 << 30) - 1, target_at((dq_q15_t){0, 0}, &at, 32767, 0).weighted.q);
+    TEST_ASSERT_EQUAL_INT32(-(1 << 30), target_at((dq_q15_t){0, 0}, &opposite, -32767, 0).weighted.q);
+}
+
 void test_the_target_of_zero_current_is_the_magnets_flux(void)
 {
     const flux_point_t at = flux_table_step(&f.flux_table, (dq_q15_t){0, 0});
@@ -388,6 +397,24 @@ void test_the_integral_part_integrates_along_the_voltage_that_holds_a_deviation(
     TEST_ASSERT_EQUAL_INT32(1000 * -40 + 300 * 100, state.s_q_q30);
 }
 
+/* The proportional part takes the voltage back to zero, so that nothing is limited. */
+void test_the_integrators_are_limited_to_one(void)
+{
+    target.integral_gain = 1000;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        const int32_t end = (sign > 0) ? (1 << 30) - 1 : -(1 << 30);
+        const int32_t back = (int32_t)(sign * 1073741824.0 / 0.8488);
+        state = (current_control_state_t){end, end};
+        flux.psi_d = flux.psi_q = sign * 20000;
+        target.weighted = (dq_q30_t){flux.psi_d * 32768 - back, flux.psi_q * 32768 - back};
+        target.psi = (dq_q15_halfword_t){(q15_t)(sign * 20100), (q15_t)(sign * 20100)};
+        (void)step();
+        TEST_ASSERT_TRUE(out.clear);
+        TEST_ASSERT_EQUAL_INT32(end, state.s_d_q30);
+        TEST_ASSERT_EQUAL_INT32(end, state.s_q_q30);
+    }
+}
+
 /* sigma/omega_b = 1/(3 T_s omega_b) = 0.8488; the proportional part follows f, the integral part psi*. */
 void test_the_proportional_part_follows_the_weighted_target_and_the_integral_part_the_target(void)
 {
@@ -500,6 +527,34 @@ void test_inside_the_circle_nothing_is_limited_in_either_direction_of_rotation(v
     TEST_ASSERT_GREATER_THAN_INT(80000, not_clear);
 }
 
+/* The voltage v in LSB of q15 of the circle's radius, by one integrator alone. */
+static int32_t integrator_for(int32_t v)
+{
+    int32_t s = (int32_t)((v - 2) / 32768.0 * v_max() * 32768.0);
+    do {
+        s += 256;
+        state = (current_control_state_t){.s_q_q30 = s};
+        (void)step();
+        TEST_ASSERT_TRUE(out.clear);
+    } while ((int16_t)(out.v >> 16) < v);
+    TEST_ASSERT_EQUAL_INT(v, (int16_t)(out.v >> 16));
+    return s;
+}
+
+/* 182/256 of q is the first voltage that leaves the d axis less than its 0.7, 22,938: it keeps them, and 22,930 are not
+ * limited. The cell from 182/256 on leaves 22,913. */
+void test_the_d_axis_keeps_its_share_of_the_circle_from_the_first_q_voltage_that_leaves_less(void)
+{
+    const int32_t s_d = integrator_for(22930), s_q = integrator_for(182 * 128);
+    state = (current_control_state_t){s_d, s_q};
+    target.psi.d = (q15_t)(target.psi.d + 1);
+    (void)step();
+    TEST_ASSERT_FALSE(limited);
+    TEST_ASSERT_FALSE(out.clear);
+    TEST_ASSERT_EQUAL_INT(22930, (int16_t)out.v);
+    TEST_ASSERT_EQUAL_INT(182 * 128, (int16_t)(out.v >> 16));
+}
+
 /* With v_q = 0 the d axis may use the whole circle although the q axis has priority. */
 void test_a_d_voltage_inside_the_circle_is_not_limited_while_the_d_flux_is_to_rise(void)
 {
@@ -578,6 +633,17 @@ void test_clear_is_set_exactly_inside_its_circle(void)
     }
 }
 
+void test_a_voltage_on_the_circle_of_clear_itself_is_not_clear(void)
+{
+    const int32_t s = integrator_for(10000);
+    for (int inside = 0; inside < 2; inside++) {
+        f.current_control.clear_q30 = (uint32_t)(10000 * 10000 + inside);
+        state = (current_control_state_t){.s_q_q30 = s};
+        (void)step();
+        TEST_ASSERT_EQUAL(inside, out.clear);
+    }
+}
+
 /* Ten seconds at the limit: the integrator settles where the anti-windup balances the integrated error; the voltage
  * before the limit is then v_max + sigma b e. When the error reverses with the same magnitude, the voltage leaves the
  * limit in the same period. */
@@ -619,6 +685,23 @@ void test_an_integrator_far_beyond_the_limit_returns_to_it_with_either_sign(void
             (void)step();
         }
         TEST_ASSERT_INT_WITHIN(15, sign * 2280, state.s_q_q30 >> 15);
+    }
+}
+
+/* The proportional part exceeds the limit in the other direction: what it lacks raises an integrator that is at its end
+ * already. */
+void test_the_anti_windup_does_not_leave_the_range_of_the_integrators(void)
+{
+    in.v_dc = 4000;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        const int32_t end = (sign > 0) ? (1 << 30) - 1 : -(1 << 30);
+        state = (current_control_state_t){0, end};
+        flux.psi_q = sign * 20000;
+        target.psi.q = (q15_t)flux.psi_q;
+        target.weighted.q = -sign * (1 << 30);
+        (void)step();
+        TEST_ASSERT_TRUE(limited);
+        TEST_ASSERT_EQUAL_INT32(end, state.s_q_q30);
     }
 }
 
