@@ -43,7 +43,7 @@ static void reset_control(drive_t *drive, sample_t *sample)
 /* The safe state: all switches of one side on (short circuit), or switching disabled (freewheel). */
 static void apply_safe_state(drive_t *drive, sample_t *sample, const command_t *command, const rotor_frame_t *now)
 {
-    if (!short_circuit_waits(&drive->fast) && short_circuit_is_needed(&drive->fast, command->safe)) {
+    if (short_circuit_may_begin(drive, sample, now->rotation) && short_circuit_is_needed(&drive->fast, command->safe)) {
         short_circuit_step(drive, sample, command->upper, now->angle_step, now->rotation);
     } else {
         short_circuit_end(&drive->fast);

@@ -4,10 +4,11 @@
 #include "control/current/measure.h"
 #include "control/current/transform.h"
 #include "hal/pwm.h"
+#include "safety/shorted_switch.h"
 #include "types/faults.h"
 
-#define AT_ONCE (FAULT_OVER_VOLTAGE | FAULT_GATE)
 #define CHANGES_MAX 2U /* the first may have been without need: a constant part of the currents looks the same */
+#define SEARCH_PERIODS 2U /* for a shorted switch, (SS-30) */
 #define DUTY_MIDDLE 16384U
 #define DUTY_UPPER 32768U
 
@@ -26,6 +27,23 @@ static bool is_searched(const fast_state_t *fast)
     return fast->short_circuit.holds && (fast->faults & FAULT_GATE) == 0U;
 }
 
+/* In the stator's frame, with the identified error of the magnet. */
+static ab_q15_t stator_flux(const drive_t *drive, const sample_t *sample, fx_pair_t rotation)
+{
+    const flux_point_t *flux = &sample->point.flux;
+    const dq_q15_t psi = {fx_sat_q15(flux->psi_d + drive->psi_d_error), fx_sat_q15(flux->psi_q)};
+    const ab_q30_t psi_q30 = inverse_park_q30(psi, rotation);
+    return (ab_q15_t){transform_round(psi_q30.alpha), transform_round(psi_q30.beta)};
+}
+
+/* The tables have the flux of these currents. */
+static bool is_flux_known(const drive_t *drive, const sample_t *sample)
+{
+    const dq_q15_t i = sample->point.i;
+    const q15_t i_max = drive->motor->current_reference.i_max;
+    return drive_currents_add_up(drive, sample) && i.d * i.d + i.q * i.q <= i_max * i_max;
+}
+
 /* The flux in every second period only: its sum has no need of every period, the direction of a current has. */
 static open_switch_t search(drive_t *drive, const sample_t *sample, int32_t angle_step, fx_pair_t rotation)
 {
@@ -39,11 +57,8 @@ static open_switch_t search(drive_t *drive, const sample_t *sample, int32_t angl
     const uint32_t step_q16 = (uint32_t)fx_abs_q31(angle_step) >> 16;
     state->searches_flux = !state->searches_flux;
     if (state->searches_flux) {
-        const flux_point_t *flux = &sample->point.flux;
-        const dq_q15_t psi = {fx_sat_q15(flux->psi_d + drive->psi_d_error), fx_sat_q15(flux->psi_q)};
-        const ab_q30_t psi_q30 = inverse_park_q30(psi, rotation);
-        const ab_q15_t stator = {transform_round(psi_q30.alpha), transform_round(psi_q30.beta)};
-        const open_switch_t found = open_switch_by_flux(&config, &state->open_switch, stator, i_squared_q30,
+        const ab_q15_t psi = stator_flux(drive, sample, rotation);
+        const open_switch_t found = open_switch_by_flux(&config, &state->open_switch, psi, i_squared_q30,
                                                         2U * step_q16);
         if (found != OPEN_SWITCH_NONE) {
             return found;
@@ -100,6 +115,65 @@ void short_circuit_step(drive_t *drive, const sample_t *sample, bool upper, int3
     short_circuit_apply(&drive->fast, upper, found);
 }
 
+/* Nothing that the diodes or a shorted switch carry, beyond the measuring error. */
+static bool is_without_current(const drive_t *drive, const sample_t *sample)
+{
+    const int32_t i_alive = drive->motor->gate_fault.i_alive;
+    const dq_q15_t i = sample->point.i;
+    return i.d * i.d + i.q * i.q <= i_alive * i_alive;
+}
+
+/* Of the last period, in which switching was disabled throughout. */
+static shorted_switch_t find_shorted(const drive_t *drive, const sample_t *sample, ab_q15_t psi)
+{
+    const sample_t *last = sample_box_at(&drive->samples, drive->samples.generation);
+    const open_switch_state_t *begin = &drive->fast.short_circuit.open_switch;
+    const shorted_switch_in_t in = {
+        .i_last = measure_phases(last->i_ab, last->zero_q28),
+        .i = measure_phases(sample->i_ab, sample->zero_q28),
+        .psi_last = fx_pair(begin->begin_alpha, begin->begin_beta),
+        .psi = fx_pair(psi.alpha, psi.beta),
+        .v_dc = sample->v_dc,
+        .turn_gain = drive->motor->launch_power.turn_gain,
+        .i_min = (q15_t)(drive->motor->plausibility.i_dead / 2),
+    };
+    return shorted_switch_find(&in);
+}
+
+/* The flux of this sample ends a period and begins the next one. */
+static shorted_switch_t search_period(drive_t *drive, const sample_t *sample, fx_pair_t rotation)
+{
+    open_switch_state_t *begin = &drive->fast.short_circuit.open_switch;
+    const ab_q15_t psi = stator_flux(drive, sample, rotation);
+    const bool is_known = is_flux_known(drive, sample);
+    const shorted_switch_t found = (is_known && begin->has_begun) ? find_shorted(drive, sample, psi)
+                                                                  : SHORTED_SWITCH_NONE;
+    begin->has_begun = is_known;
+    begin->begin_alpha = (q15_t)psi.alpha;
+    begin->begin_beta = (q15_t)psi.beta;
+    return found;
+}
+
+static void search_shorted(drive_t *drive, const sample_t *sample, fx_pair_t rotation)
+{
+    fast_state_t *fast = &drive->fast;
+    short_circuit_t *state = &fast->short_circuit;
+    if ((fast->faults & FAULT_GATE) == 0U || state->waits == 0U) {
+        return;
+    }
+    const uint32_t periods = drive->samples.generation + 1U - fast->fault_period; /* since the first fault */
+    const shorted_switch_t found = search_period(drive, sample, rotation);
+    if (found != SHORTED_SWITCH_NONE) {
+        state->side = (found == SHORTED_SWITCH_UPPER) ? SHORT_CIRCUIT_UPPER : SHORT_CIRCUIT_LOWER;
+        state->changes = CHANGES_MAX;
+    }
+    /* The drivers may have switched off in the middle of the period before the first fault. */
+    if (periods > 0U &&
+        (found != SHORTED_SWITCH_NONE || periods >= SEARCH_PERIODS || !is_without_current(drive, sample))) {
+        state->waits = 0;
+    }
+}
+
 void short_circuit_end(fast_state_t *fast)
 {
     fast->short_circuit.holds = false;
@@ -112,12 +186,13 @@ void short_circuit_prepare(fast_state_t *fast, uint32_t periods)
     fast->short_circuit.holds = false;
     fast->short_circuit.changes = 0;
     fast->short_circuit.waits = (uint8_t)periods;
+    fast->short_circuit.open_switch.has_begun = false;
 }
 
 bool short_circuit_waits(fast_state_t *fast)
 {
     const uint32_t faults = fast->faults;
-    const bool at_once = (faults & AT_ONCE) != 0U || (faults & ~FAULTS_CONTROLLED) == 0U;
+    const bool at_once = (faults & FAULT_OVER_VOLTAGE) != 0U || (faults & ~FAULTS_CONTROLLED) == 0U;
     if (at_once || fast->short_circuit.waits == 0U) {
         fast->short_circuit.waits = 0;
         return false;
@@ -143,4 +218,10 @@ bool short_circuit_is_needed(const fast_state_t *fast, safe_t safe)
     const bool on_gate_fault = safe == SAFE_SHORT_ON_GATE_FAULT || safe == SAFE_SHORT_ON_EITHER;
     return safe == SAFE_SHORT_CIRCUIT || (on_over_voltage && (faults & FAULT_OVER_VOLTAGE) != 0U) ||
            (on_gate_fault && (faults & FAULT_GATE) != 0U);
+}
+
+bool short_circuit_may_begin(drive_t *drive, const sample_t *sample, fx_pair_t rotation)
+{
+    search_shorted(drive, sample, rotation);
+    return !short_circuit_waits(&drive->fast);
 }

@@ -5,15 +5,17 @@
  *   The gate signals are read back. If those that were on are off a period later, the gate drivers have ended the short
  *   circuit: a switch of the other side is shorted, and switching on against it short-circuits the dc link. The other
  *   side is then tried, on which the shorted switch does no harm. If the drivers end that one, too, switching stays
- *   disabled. The task chooses the first side (safety/short_side.h). Where a switch of that side does not switch on
- *   (safety/open_switch.h), the side is changed, at most twice until the bridge runs again. Neither applies once the
+ *   disabled. The task chooses the first side (safety/short_side.h), unless the currents after a gate fault show that
+ *   of a shorted switch (safety/shorted_switch.h). Where a switch of the side does not switch on
+ *   (safety/open_switch.h), it is changed, at most twice until the bridge runs again. None of these applies once the
  *   drivers have ended one side.
  *   While the fault line is active nothing can be switched on; this does not count as a failure of a side.
  *   After a fault the currents may have any value, and a short circuit would rotate their flux about the origin. For
  *   half a step of the task switching is therefore disabled first, and the dc link opposes the currents. This wait is
- *   left out after an over-voltage, which the energy of the currents would raise, after a gate fault, and after faults
- *   that leave control intact: then the currents have been moved before.
- * Source   docs/theory/safe-state.md (SS-11), (SS-20), (SS-21)
+ *   left out after an over-voltage, which the energy of the currents would raise, and after faults that leave control
+ *   intact: then the currents have been moved before. After a gate fault it ends once the side is known, a current
+ *   flows, or two periods have passed since the period of the fault.
+ * Source   docs/theory/safe-state.md (SS-11), (SS-20), (SS-21), (SS-30)
  * Units    PWM periods
  * Range    up to 255 periods of waiting
  * Errors   none: if the drivers end the short circuit on both sides, switching stays disabled
@@ -31,6 +33,10 @@ void short_circuit_prepare(fast_state_t *fast, uint32_t periods);
 
 /** Whether switching stays disabled in this period, before the short circuit; called once per period. */
 bool short_circuit_waits(fast_state_t *fast);
+
+/** The same with the search for a shorted switch, which may end the wait; rotation: cosine, sine of the sample's angle.
+ * Called once per period of a fault in place of short_circuit_waits(). */
+bool short_circuit_may_begin(drive_t *drive, const sample_t *sample, fx_pair_t rotation);
 
 /** Ends the short circuit: switching is disabled, and the duties are one half. */
 void short_circuit_end(fast_state_t *fast);

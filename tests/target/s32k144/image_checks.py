@@ -168,6 +168,20 @@ def a_shorted_switch_ends_in_the_short_circuit_on_its_side(parts: Parts) -> None
             assert abs(loop.get("truth.torque_Nm")) < 10.0, "the short circuit is symmetrical"
 
 
+def a_short_circuit_that_the_drivers_end_is_made_on_the_other_side(parts: Parts) -> None:
+    """The defect moves from a lower switch to an upper one while the lower ones are on: the drivers end that."""
+    with driving(parts) as (loop, core):
+        loop.set("plant.switch_shorted_lower_b", 1)
+        loop.run(2000)
+        assert core.outputs == ALL_OUTPUTS
+        assert core.duty(0) == 0.0
+        loop.set("plant.switch_shorted_lower_b", 0)
+        loop.set("plant.switch_shorted_upper_a", 1)
+        loop.run(10)
+        assert core.outputs == ALL_OUTPUTS
+        assert [core.duty(pair) for pair in range(3)] == 3 * [1.0]
+
+
 def the_gates_are_read_back_at_their_pins(parts: Parts) -> None:
     """A lower output that no longer reaches its pin ends the short circuit on this side, although the timer runs."""
     with driving(parts) as (loop, core):
@@ -192,6 +206,7 @@ CHECKS = (
     a_winding_at_the_end_of_its_line_trips,
     a_wrong_reference_of_the_converters_is_found,
     a_shorted_switch_ends_in_the_short_circuit_on_its_side,
+    a_short_circuit_that_the_drivers_end_is_made_on_the_other_side,
 )
 
 

@@ -77,6 +77,10 @@ PLANTED_ERRORS: dict[str, tuple[Callable[[Parts], None], PlantedError]] = {
     ),
     "the latch of the fault input is never ended": (
         checks.a_shorted_switch_ends_in_the_short_circuit_on_its_side,
+        PlantedError("pwm.c", "    if (is_fault_over()) {\n", "    if (is_fault_over() && !ended_by_fault) {\n"),
+    ),
+    "the latch of the fault input is not ended while switching is enabled": (
+        checks.a_short_circuit_that_the_drivers_end_is_made_on_the_other_side,
         PlantedError("pwm.c", "again = on && ended_by_fault", "again = !on && ended_by_fault"),
     ),
     "the gates read back as they were commanded": (

@@ -149,7 +149,7 @@ void test_a_fault_shorts_the_phases_half_a_step_later_if_the_task_has_decided_so
     expect_shorted(true);
 }
 
-/* An over-voltage or a gate fault cannot wait, and over-temperature and over-speed have moved the currents. Nothing
+/* An over-voltage cannot wait, and over-temperature and over-speed have moved the currents. Nothing
  * waits a second time, and nothing without a bridge that has run. */
 void test_only_a_fault_that_leaves_unknown_currents_waits_and_only_once(void)
 {
@@ -160,7 +160,8 @@ void test_only_a_fault_that_leaves_unknown_currents_waits_and_only_once(void)
         {FAULT_OVER_CURRENT, true},
         {FAULT_OVER_CURRENT | FAULT_TEMPERATURE, true},
         {FAULT_OVER_CURRENT | FAULT_OVER_VOLTAGE, false},
-        {FAULT_TORQUE | FAULT_GATE, false},
+        {FAULT_TORQUE | FAULT_GATE, true},
+        {FAULT_GATE | FAULT_OVER_VOLTAGE, false},
         {FAULT_TEMPERATURE | FAULT_OVER_SPEED, false},
         {0, false},
     };
@@ -495,7 +496,8 @@ void test_while_the_fault_line_is_active_no_side_fails(void)
     seam_periods(3);
     seam.gates_blocked = true;
     write_command(SAFE_SHORT_CIRCUIT, FAULT_GATE);
-    for (int k = 0; k < 5; k++) {
+    seam_periods(2); /* of the search for a shorted switch */
+    for (int k = 0; k < 3; k++) {
         seam_period();
         expect_shorted(true);
         TEST_ASSERT_FALSE(drive_is_shorted(&drive));
@@ -514,6 +516,10 @@ void test_a_gate_fault_shorts_the_phases_if_the_task_has_decided_so(void)
         seam_periods(3);
         write_command(n == 0 ? SAFE_SHORT_ON_OVER_VOLTAGE : SAFE_SHORT_ON_GATE_FAULT, 0);
         drive_raise_fault(&drive, FAULT_GATE);
+        for (int k = 0; k < 2; k++) {
+            seam_period();
+            expect_shorted(false);
+        }
         seam_period();
         expect_shorted(n == 1);
     }
@@ -523,6 +529,84 @@ void test_a_gate_fault_shorts_the_phases_if_the_task_has_decided_so(void)
     write_command(SAFE_SHORT_ON_GATE_FAULT, FAULT_TORQUE);
     seam_period();
     expect_shorted(false);
+}
+
+/* Currents that stay constant with switching disabled, one out of the bridge and two into it, circulate through an
+ * upper switch. The period of the fault shows nothing: the drivers may have switched off late in it. */
+void test_a_gate_fault_waits_for_one_period_where_currents_flow(void)
+{
+    seam_run();
+    seam_periods(3);
+    write_command(SAFE_SHORT_ON_GATE_FAULT, 0);
+    seam_current(15.0, -7.5, -7.5); /* 5 % of the largest are 12.5 A */
+    drive_raise_fault(&drive, FAULT_GATE);
+    seam_period();
+    expect_shorted(false);
+    seam_period();
+    expect_shorted_by_the_upper_switches();
+}
+
+/* A period with switching disabled, whose currents flow out of the bridge in phase a and into it in b; the flux changes
+ * in the direction of phase c alone, so that a and b have the same voltage, which a switch must have caused. last_q15:
+ * the currents at the beginning of the period. */
+static void search_shorted(int32_t psi_c, uint32_t periods, int32_t last_q15, int32_t amperes_q15)
+{
+    seam_start();
+    drive.fast.short_circuit.waits = 5;
+    drive.fast.faults = FAULT_GATE;
+    for (uint32_t k = 0; k < 2U; k++) {
+        const int32_t alpha = (k == 0U) ? last_q15 : amperes_q15, beta = -(int32_t)(alpha / 1.7320508);
+        sample_t sample = {.i_ab = fx_pair(alpha, beta), .point.i = {alpha, beta}, .v_dc = 22938};
+        sample.point.flux.psi_d = (k == 0U) ? 0 : -psi_c / 2;
+        sample.point.flux.psi_q = (k == 0U) ? 0 : (int32_t)(-psi_c * SQRT3_HALF);
+        drive.samples.generation = 69U + k;
+        drive.fast.fault_period = 71U - periods;
+        if (k == 1U || periods != 0U) {
+            (void)short_circuit_may_begin(&drive, &sample, fx_pair(32767, 0));
+        }
+        drive.samples.slot[(70U + k) % SAMPLE_SLOTS] = sample;
+    }
+}
+
+static void expect_search(int32_t psi_c, uint32_t periods, short_circuit_side_t side, unsigned waits)
+{
+    search_shorted(psi_c, periods, 4000, 4000);
+    TEST_ASSERT_EQUAL(side, drive.fast.short_circuit.side);
+    TEST_ASSERT_EQUAL_UINT(waits, drive.fast.short_circuit.waits);
+}
+
+/* psi_c: the third phase is 0.4 of the dc voltage away from the rail of the other two. */
+void test_the_currents_of_a_gate_fault_show_the_side_of_a_shorted_switch(void)
+{
+    const int32_t psi_c = (int32_t)(0.4 * 22938 * 0.3299 * 2.0 / 3.0);
+    expect_search(-psi_c, 1, SHORT_CIRCUIT_UPPER, 0);
+    TEST_ASSERT_EQUAL_UINT8(2, drive.fast.short_circuit.changes); /* kept from then on */
+    expect_search(psi_c, 1, SHORT_CIRCUIT_LOWER, 0);
+    expect_search(-psi_c, 0, SHORT_CIRCUIT_LOWER, 4); /* the period of the fault */
+    expect_search(0, 1, SHORT_CIRCUIT_LOWER, 0);      /* nothing to be seen, but a current flows */
+    TEST_ASSERT_EQUAL_UINT8(0, drive.fast.short_circuit.changes);
+}
+
+void test_the_search_for_a_shorted_switch_ends_after_two_periods_without_current(void)
+{
+    for (uint32_t periods = 0; periods < 3; periods++) {
+        search_shorted(-2000, periods, 0, 0);
+        TEST_ASSERT_EQUAL_UINT(periods < 2U ? 4U - periods : 0U, drive.fast.short_circuit.waits);
+        TEST_ASSERT_EQUAL_UINT8(0, drive.fast.short_circuit.changes);
+    }
+}
+
+/* The tables end at the largest current. */
+void test_currents_beyond_the_tables_show_no_shorted_switch(void)
+{
+    static const int32_t beyond[2][2] = {{4000, 24000}, {24000, 4000}};
+    for (int k = 0; k < 2; k++) {
+        search_shorted(-2000, 1, beyond[k][0], beyond[k][1]);
+        TEST_ASSERT_EQUAL(SHORT_CIRCUIT_LOWER, drive.fast.short_circuit.side);
+        TEST_ASSERT_EQUAL_UINT(0, drive.fast.short_circuit.waits);
+    }
+    search_shorted(-2000, 1, 16000, 16000);
+    TEST_ASSERT_EQUAL(SHORT_CIRCUIT_UPPER, drive.fast.short_circuit.side);
 }
 
 /* Switching is disabled, the machine turns slowly, and 100 A still flow in the next steps of the task. */
