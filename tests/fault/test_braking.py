@@ -15,6 +15,7 @@ from fluxtrue_tools.sim.motor import load
 
 CAMPAIGN = spec.read(Path(__file__).with_name("campaign.toml"))
 STRONG = "plant.magnet_scale=1.06"
+PRIUS = Path(__file__).resolve().parents[1] / "motors" / "prius"
 HOT = "plant.winding_C=240"
 
 
@@ -61,6 +62,13 @@ def test_with_too_strong_a_magnet_the_braking_grows_beyond_that_of_the_short_cir
     assert braking_Nm("paper", 1.06, LOWER, STRONG) > 9.0
     assert braking_Nm("paper", 1.09, OFF, STRONG) > 15.0
     assert braking_Nm("paper", 1.09, LOWER, STRONG) < 10.0
+
+
+@pytest.mark.parametrize(("share", "off_Nm", "shorted_Nm"), [(1.03, 0.2, 2.0), (1.06, 1.3, 2.0), (1.08, 4.0, 1.9)])
+def test_about_its_level_a_machine_brakes_as_the_page_says(share: float, off_Nm: float, shorted_Nm: float) -> None:
+    """The row `prius` of docs/theory/safe-state.md, to its last digit."""
+    assert round(braking_Nm(str(PRIUS), share, OFF), 1) == off_Nm
+    assert round(braking_Nm(str(PRIUS), share, LOWER), 1) == shorted_Nm
 
 
 def test_just_above_its_level_much_saliency_brakes_at_once() -> None:

@@ -41,6 +41,8 @@ def test_shares_are_of_the_motor_that_runs(name: str, paper: Motor, hsm1: Motor)
     ("profile", "message"),
     [
         ("torque_share = 1.2", "profile.torque_share = 1.2, allowed: -1 to 1"),
+        ("torque_share = [[0, 0], [0.5, 1.2]]", "profile.torque_share.1 = [0.5, 1.2], allowed: -1 to 1"),
+        ("torque_share = [[0, 0], [0.5, 'x']]", "profile.torque_share.1 = [0.5, 'x'], allowed: [t, value]"),
         ("torque_share = 0.5\ntorque_Nm = 10", "profile.torque_share and profile.torque_Nm: give one of the two"),
         ("speed_share = 0.5\nspeed_rpm = 10", "profile.speed_share and profile.speed_rpm: give one of the two"),
         ("torque_share = 'half'", "profile.torque_share = 'half': allowed: a number, or a list"),

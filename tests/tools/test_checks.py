@@ -442,6 +442,17 @@ def test_a_time_out_that_follows_from_the_recorded_time_is_accepted(told: Callab
     assert told("slow", TIMEOUT=1500.0, COST=300.0) == told("quick", TIMEOUT=1800.0, COST=1.0) == []
 
 
+def test_a_recorded_time_of_a_test_that_no_longer_exists_is_found(
+    told: Callable[..., list[str]], tmp_path: Path
+) -> None:
+    assert told("quick", TIMEOUT=1800.0, COST=1.0) == []
+    times = importlib.import_module("times")
+    (tmp_path / "tests" / "seconds.txt").write_text("slow 300\nrenamed 40\n")
+    assert list(times.gone(tmp_path, ["slow", "renamed", "quick"])) == []
+    (violation,) = times.gone(tmp_path, ["slow", "quick"])
+    assert violation.text.startswith("renamed: no test has this name")
+
+
 LOG = """\
       Start  2: slow
  1/3 Test  #2: slow .............................   Passed  120.40 sec

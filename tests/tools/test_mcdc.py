@@ -19,7 +19,7 @@ import pytest
 PROJECT = Path(__file__).resolve().parents[2]
 CHECKER = PROJECT / "tools" / "checks" / "mcdc.py"
 sys.path.insert(0, str(CHECKER.parent))
-from mcdc import LLVM, MAPPING, reports  # noqa: E402
+from mcdc import LLVM, MAPPING, PARTS, page_rows, reports  # noqa: E402
 
 RECORDED = Path(__file__).with_name("mcdc_recorded.json")
 RECORD = "FLUXTRUE_RECORD_MCDC"
@@ -209,6 +209,26 @@ def test_an_exclusion_without_a_reason_or_in_another_form_is_refused(tmp_path: P
     assert code == 1
     assert "0 exclusions" in printed
     assert complaints[0].startswith("firmware/safety/a.c:1: ")
+
+
+def test_a_count_of_the_page_that_was_not_measured_is_found(both: Path, run: Run) -> None:
+    build = run(both, "both(1, 1); both(0, 1); both(1, 0);")
+    page = "\n".join(page_rows({name: [0, 0, 0] for name, _, _ in PARTS} | {"safety": [2, 2, 0]}, 1))
+    write(both, "docs/safety/mcdc.md", page)
+    assert check(both, "--build", build)[0] == 0
+    write(both, "docs/safety/mcdc.md", page.replace("safety | 2", "safety | 3").replace("in 1 ", "in 4 "))
+    assert check(both, "--build", build)[2] == [
+        "docs/safety/mcdc.md:1: no row '| safety | 2 | 0 |', which was measured",
+        "docs/safety/mcdc.md:1: no row '| all, in 1 decisions | 2 | 0 |', which was measured",
+    ]
+
+
+def test_a_number_of_exclusions_of_the_page_is_compared_without_the_measurement(both: Path) -> None:
+    write(both, "firmware/safety/both.c", *BOTH[:3], f"{BOTH[3]} /* MCDC_EXCL C1,C2: {REASON} */", BOTH[4])
+    write(both, "docs/safety/mcdc.md", "| safety | 0 | 2 |", "| all, in 1 decisions | 0 | 2 |")
+    assert check(both)[0] == 0
+    write(both, "docs/safety/mcdc.md", "| safety | 1 | 1 |")
+    assert check(both)[2] == ["docs/safety/mcdc.md:1: safety: 1 excluded, the sources exclude 2"]
 
 
 def test_without_counts_the_report_says_what_writes_them(both: Path, run: Run) -> None:

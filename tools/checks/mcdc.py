@@ -12,7 +12,7 @@ by the object that has it; they are put together here, because all objects are m
 
 What clang does not measure has no decision in its report: a decision with another one inside an operand, as an argument
 of a call; code that no test program is built from. Each && and || of the sources must therefore lie in a measured
-decision.
+decision. The table of docs/safety/mcdc.md must state the counts; its exclusions are compared without clang, too.
 
 An exclusion stands in the line in which the decision begins, or alone in the line before it:
 
@@ -34,6 +34,7 @@ from pathlib import Path
 from tree import PROJECT, REASON_WORDS, Violation, files, lines, listed, report
 
 LLVM = Path("build", "clang", "bin")
+PAGE = Path("docs", "safety", "mcdc.md")  # states the counts
 LABEL = "^coverage$"
 MAPPING = b"__llvm_covmap"  # section of a program that has instrumented functions; llvm-cov refuses one without
 # Part, its sources (the first that fits counts), what must be shown of its conditions in percent.
@@ -68,6 +69,7 @@ FILE = re.compile(r"^(/.*):$")
 DECISION = re.compile(r"---> MC/DC Decision Region \((\d+):(\d+)\) to \((\d+):(\d+)\)")
 CONDITION = re.compile(r"Condition C(\d+) --> \((\d+):(\d+)\)")
 EXECUTED = re.compile(r"\|\s+\d+ \{ ([TFC\-, ]+?) = ([TF]) +\}")
+ROW = re.compile(r"\| (\w+) \| \d+ \| (\d+) \|$")  # of the page
 FOLDED = re.compile(r"C(\d+)-Pair: constant folded")
 
 Place = tuple[int, int]  # line and column, from 1
@@ -259,6 +261,32 @@ def complaints(root: Path, missing: list[tuple[Decision, list[int]]], verbose: b
                             f"C{number} not shown: {_text(root, decision, number)}{tail}")  # fmt: skip
 
 
+def page_rows(figures: dict[str, list[int]], decisions: int) -> list[str]:
+    """The table of the page: conditions and exclusions of each part."""
+    rows = [f"| {name} | {counted} | {without} |" for name, (_, counted, without) in figures.items()]
+    counted, without = (sum(row[n] for row in figures.values()) for n in (1, 2))
+    return [*rows, f"| all, in {decisions} decisions | {counted} | {without} |"]
+
+
+def outdated(root: Path, rows: Iterable[str]) -> Iterator[Violation]:
+    """Rows that the page has to have; a checkout without the page states nothing."""
+    stated = lines(root, PAGE) if (root / PAGE).exists() else None
+    for row in rows:
+        if stated is not None and row not in stated:
+            yield Violation(PAGE, 1, f"no row '{row}', which was measured")
+
+
+def excluded_rows(root: Path, excluded: Iterable[Exclusion]) -> Iterator[Violation]:
+    """Rows of the page whose exclusions are not those in the sources."""
+    found = dict.fromkeys((name for name, _, _ in PARTS), 0)
+    for one in excluded:
+        found[part_of(one.path)] += len(one.conditions)
+    for number, line in enumerate(lines(root, PAGE) if (root / PAGE).exists() else [], 1):
+        match = ROW.match(line)
+        if match and match[1] in found and int(match[2]) != found[match[1]]:
+            yield Violation(PAGE, number, f"{match[1]}: {match[2]} excluded, the sources exclude {found[match[1]]}")
+
+
 def evaluate(root: Path, build: Path, excluded: list[Exclusion], part: str) -> Iterator[Violation]:
     """Print the table; yield what is missing."""
     decisions = measured(root, build)
@@ -273,6 +301,7 @@ def evaluate(root: Path, build: Path, excluded: list[Exclusion], part: str) -> I
     print(f"{'all':14} {sum(f[0] for f in figures.values()):5} of {sum(f[1] for f in figures.values()):10}"
           f", {len(decisions)} decisions")  # fmt: skip
     if not part:
+        yield from outdated(root, page_rows(figures, len(decisions)))
         yield from unmeasured(root, decisions, excluded)
         yield from stale(decisions, excluded)
 
@@ -286,6 +315,7 @@ def main() -> int:
                         help="all conditions that are not shown, of one part or of all")  # fmt: skip
     args = parser.parse_args()
     exclusions, violations = listed(all_exclusions(args.root), "MC/DC")
+    violations += excluded_rows(args.root, exclusions)
     if args.build:
         violations += evaluate(args.root.resolve(), args.build.resolve(), exclusions, args.part)
     return report(violations, "mcdc")

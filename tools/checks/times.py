@@ -2,6 +2,7 @@
 """Time-outs of the tests: every one follows from tests/seconds.txt, by tools/cmake/TestTime.cmake.
 
     times.py BUILD                       check what ctest was told
+    times.py BUILD --whole               the same in a build that has all tests: no time is recorded of any other
     times.py BUILD --record LOG          write down what the tests took in a whole run on an idle computer: ctest's log,
                                          which tools/test leaves in build/host-ctest.log
     times.py BUILD --record TEST ...     run these tests one by one and write down how long they take
@@ -60,6 +61,12 @@ def check(root: Path, tests: dict[str, dict[str, Any]]) -> Iterator[Violation]:
             yield Violation(SECONDS, 1, f"{name}: RUN_SERIAL, but no test depends on what else the computer does")
 
 
+def gone(root: Path, tests: Iterable[str]) -> Iterator[Violation]:
+    """Recorded times of tests that no longer exist: a test that was renamed would begin last."""
+    for name in sorted(recorded(root).keys() - set(tests)):
+        yield Violation(SECONDS, 1, f"{name}: no test has this name; delete its line, or write the new name")
+
+
 def spent(build: Path, name: str) -> float:
     """Seconds of processor time that one test takes."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -103,13 +110,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("build", type=Path)
     parser.add_argument("--root", type=Path, default=PROJECT)
+    parser.add_argument("--whole", action="store_true", help="this build has all tests")
     parser.add_argument("--record", nargs="+", metavar="LOG|TEST")
     given = parser.parse_args()
     if given.record and Path(given.record[0]).is_file():
         return record_log(given.root, Path(given.record[0]), described(given.build))
     if given.record:
         return record(given.root, given.build, given.record)
-    return report(check(given.root, described(given.build)), "time-outs")
+    tests = described(given.build)
+    found = list(check(given.root, tests)) + (list(gone(given.root, tests)) if given.whole else [])
+    return report(found, "time-outs")
 
 
 if __name__ == "__main__":

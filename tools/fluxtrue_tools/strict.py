@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+from pydantic_core import PydanticCustomError
 
 from fluxtrue_tools.errors import FluxtrueError
 
 SIZE_MAX = 10_000_000  # bytes; the largest file of the project has two thousand
+TOO_LARGE = "too_large"  # kind of error of a number whose magnitude is above the next one
 LARGEST = 1e12  # of a number in any of the units: what is larger is a slip, and its square may overflow
 SHOWN_MAX = 60  # characters of a bad value in a message
 UNITS = {
@@ -38,6 +40,14 @@ class Strict(BaseModel):
         return set(self.model_fields_set)
 
 
+class PartError(ValueError):
+    """A value is wrong in one part of it: where below its key, what stands there, and what is allowed there."""
+
+    def __init__(self, at: tuple[int | str, ...], value: Any, allowed_there: str) -> None:
+        super().__init__(allowed_there)
+        self.at, self.value = at, value
+
+
 Model = TypeVar("Model", bound=BaseModel)
 
 
@@ -50,7 +60,9 @@ def number(value: Any) -> Any:
     except OverflowError:
         return math.inf
     if LARGEST < abs(found) < math.inf:
-        raise ValueError(f"allowed: from {-LARGEST:g} to {LARGEST:g}")
+        raise PydanticCustomError(
+            TOO_LARGE, "a number of a smaller magnitude"
+        )  # explain() says which numbers are allowed
     return found
 
 
@@ -115,13 +127,13 @@ def _leaf(annotation: Any, location: Iterable[int | str]) -> tuple[Any, list[Any
     return None, []
 
 
-def _range(metadata: list[Any]) -> str:
-    """The limits of a field in words, from the annotations the validation itself uses."""
+def _range(metadata: list[Any], least: str, most: str) -> str:
+    """The limits of a field in words, from the annotations the validation itself uses; without one, as given."""
     found = {name: getattr(item, name) for item in metadata for name in ("ge", "gt", "le", "lt", "min_length",
              "max_length", "pattern") if getattr(item, name, None) is not None}  # fmt: skip
-    low = f"from {found['ge']:g}" if "ge" in found else f"above {found['gt']:g}" if "gt" in found else ""
-    high = f"{found['le']:g}" if "le" in found else f"below {found['lt']:g}" if "lt" in found else ""
-    if low and high and low.startswith("from") and "le" in found:
+    low = f"from {found['ge']:g}" if "ge" in found else f"above {found['gt']:g}" if "gt" in found else least
+    high = f"{found['le']:g}" if "le" in found else f"below {found['lt']:g}" if "lt" in found else most
+    if low.startswith("from") and high and not high.startswith("below"):
         return f" {low} to {high}"
     return " " + " up to ".join(part for part in (low, high) if part) if low or high else ""
 
@@ -138,15 +150,15 @@ def _nouns(kind: Any) -> str:
     return {int: "a whole number", float: "a finite number", bool: "true or false", str: "text"}.get(kind, "")
 
 
-def allowed(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
-    """What the field at a location takes, in words with its unit."""
+def allowed(model: type[BaseModel], location: tuple[int | str, ...], complete: bool = False) -> str:
+    """What the field at a location takes, in words with its unit; complete: with both ends of its range."""
     kind, metadata = _leaf(model, location)
     keys = [str(part) for part in location if isinstance(part, str)]
     unit = unit_of(keys[-1]) if keys and kind in (int, float) else ""
     if kind is str:
         longest = next((item.max_length for item in metadata if getattr(item, "max_length", None)), None)
         return f"text of 1 to {longest} characters" if longest else "text, not empty"
-    span = _range(metadata)
+    span = _range(metadata, f"from {-LARGEST:g}", f"{LARGEST:g}") if complete else _range(metadata, "", "")
     return f"{_nouns(kind)}{span}{' ' if span or not unit else ', in '}{unit}".strip()
 
 
@@ -164,13 +176,17 @@ def explain(error: ValidationError, model: type[BaseModel], words: dict[str, str
     where = ".".join(map(str, location))
     if first["type"] == "extra_forbidden":
         return f"{where}: unknown key, allowed: {_keys(model, location)}"
-    what = (words or {}).get(where) or allowed(model, location)
+    what = (words or {}).get(where) or allowed(model, location, first["type"] == TOO_LARGE)
     if first["type"] == "missing":
         return f"{where}: missing, wanted: {what}"
     if first["type"] == "value_error":
+        cause = first.get("ctx", {}).get("error")
+        if isinstance(cause, PartError):
+            return f"{quantity('.'.join(map(str, (*location, *cause.at))), cause.value)}, allowed: {cause}"
         text = first["msg"].removeprefix("Value error, ")
         own_name = not where or text.startswith(where)
-        if own_name or isinstance(first["input"], dict):  # the complaint about a table names a key in it
+        names_key = isinstance(first["input"], dict) and not text.startswith("allowed: ")
+        if own_name or names_key:  # the complaint about a table names a key in it
             return text if own_name else f"{where}.{text}"
         return f"{quantity(where, first['input'])}: {text}"
     if not where:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """flux_map.csv: errors are reported with their line number."""
 
+import numpy as np
 import pytest
 from conftest import plane, straight
 
@@ -15,6 +16,14 @@ GOOD = plane(ID, IQ, straight)
 def changed(line: int, text: str) -> str:
     lines = GOOD.splitlines()
     lines[line - 1] = text
+    return "\n".join(lines) + "\n"
+
+
+def with_torque(cell: str) -> str:
+    """The map with a column of torques, of which that on line 5 is given."""
+    lines = [f"{line},1.5" for line in GOOD.splitlines()]
+    lines[0] = f"{GOOD.splitlines()[0]},torque_Nm"
+    lines[4] = lines[4].removesuffix("1.5") + cell
     return "\n".join(lines) + "\n"
 
 
@@ -35,6 +44,10 @@ BAD = [
     (changed(5, "-300.0,150.0,abc,0.075"), ["flux_map.csv:5", "psi_d_Vs = 'abc'", "a number"]),
     (changed(5, "-300.0,150.0,0.024"), ["flux_map.csv:5", "3 columns", "4 as in the header"]),
     (changed(5, "-300.0,150.0,,0.075"), ["flux_map.csv:5", "psi_d_Vs = ''"]),
+    (with_torque("n/a"), ["flux_map.csv:5", "torque_Nm = 'n/a'", "a number"]),
+    (with_torque("nan"), ["flux_map.csv:5", "torque_Nm = nan", "finite"]),
+    (with_torque("-inf"), ["flux_map.csv:5", "torque_Nm = -inf", "finite"]),
+    (with_torque(""), ["flux_map.csv:5", "torque_Nm = ''", "a number"]),
     (GOOD + "-300.0,150.0,0.024,0.075\n", ["flux_map.csv:22", "again, first on line 5"]),
     (without(9), ["no row with id_A = -200, iq_A = 0", "lines 7 to 10", "rectangular"]),
     (changed(9, "-200.0,1.0,0.044,0.0005"), ["no row with", "rectangular"]),
@@ -58,6 +71,11 @@ def test_a_bad_map_is_refused_with_the_place(write, text, words):
     assert "\n" not in message and "flux_map.csv" in message
     for word in words:
         assert word in message, message
+
+
+def test_the_torques_of_a_map_are_not_used_as_long_as_they_are_numbers(write):
+    assert np.array_equal(load_motor(write(flux_map=with_torque("-1e6"))).flux_map.psi_q_Vs,
+                          load_motor(write(flux_map=GOOD)).flux_map.psi_q_Vs)  # fmt: skip
 
 
 def test_a_map_that_is_not_there_is_named(write, folder):

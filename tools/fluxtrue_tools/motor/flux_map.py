@@ -12,6 +12,8 @@ from fluxtrue_tools.motor.text_table import ROWS_MAX, SEPARATORS, cells, data_li
 
 COLUMNS = ("id_A", "iq_A", "psi_d_Vs", "psi_q_Vs")
 MARK = "extrapolated"  # a further column, of imported maps: 1 where the source has no points
+TORQUE = "torque_Nm"  # a further column, which no value is taken from
+TORQUE_MAX = 1e9  # N·m
 NODES_MIN = 4
 
 
@@ -70,12 +72,15 @@ def _rows(path: Path) -> tuple[list[tuple[int, float, float, float, float]], int
             )
     places = [header.index(column) for column in COLUMNS]
     mark = header.index(MARK) if header.count(MARK) == 1 else None
+    torques = [k for k, name in enumerate(header) if name == TORQUE]
     rows, marked = [], 0
     for line, text in lines[1:]:
         row = cells(path, line, text)
         if len(row) != len(header):
             raise FluxtrueError(f"{path}:{line}: {len(row)} columns, wanted: {len(header)} as in the header")
         values = [number(path, line, column, row[k]) for column, k in zip(COLUMNS, places, strict=True)]
+        for k in torques:  # a torque that is no number is the sign of a damaged export
+            number(path, line, TORQUE, row[k], TORQUE_MAX)
         rows.append((line, *values))
         marked += mark is not None and row[mark] == "1"
     return rows, marked  # type: ignore[return-value]

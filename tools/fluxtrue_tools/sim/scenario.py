@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scenario file: strict, every field with its unit in the name."""
 
-import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -9,37 +8,45 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from fluxtrue_tools import faults, strict
 from fluxtrue_tools.sim import effects
-from fluxtrue_tools.strict import Flag, Number, Strict, number
+from fluxtrue_tools.strict import LARGEST, Flag, Number, PartError, Strict
 
 POINTS_MAX = 10_000
 POINTS_ALLOWED = "allowed: a number, or a list of [t, value]"
+RANGE = f"from {-LARGEST:g} to {LARGEST:g}"
+SHARE_ALLOWED = "-1 to 1 (of the motor's torque_max_Nm)"
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _check_times(points: list[list[float]]) -> None:
+    """Refuse the first point whose time does not fit those before it."""
+    for index, (time, _) in enumerate(points):
+        if time < 0.0:
+            raise PartError((index,), points[index], "a time that is not negative")
+        if index >= 1 and time < points[index - 1][0]:
+            raise PartError((index,), points[index], f"times must not go backwards, from {points[index - 1][0]:g} s on")
+        if index >= 2 and time == points[index - 2][0]:
+            raise PartError((index,), points[index], "at most two points may share a time: before and after a step")
 
 
 def _points(value: Any) -> Any:
     """A plain number is constant; a list of [time, value] is piecewise linear."""
-    value = number(value)
-    if isinstance(value, float):
-        return ((0.0, value),)
+    if _is_number(value):
+        if not abs(value) <= LARGEST:
+            raise PartError((), value, f"a finite number {RANGE}")
+        return ((0.0, float(value)),)
     if not isinstance(value, list) or not value:
         raise ValueError(POINTS_ALLOWED)
-    points = []
-    for point in value:
-        if not (
-            isinstance(point, list)
-            and len(point) == 2
-            and all(isinstance(x, int | float) and not isinstance(x, bool) for x in point)
-            and all(math.isfinite(number(x)) for x in point)
-        ):
-            raise ValueError(POINTS_ALLOWED)
-        points.append((float(point[0]), float(point[1])))
-    times = [time for time, _ in points]
-    if len(times) > POINTS_MAX:
-        raise ValueError(f"{len(times)} points, allowed: up to {POINTS_MAX}")
-    if times != sorted(times) or times[0] < 0.0:
-        raise ValueError("times must not be negative nor go backwards")
-    if any(first == third for first, third in zip(times, times[2:], strict=False)):
-        raise ValueError("at most two points may share a time: before and after a step")
-    return tuple(points)
+    for index, point in enumerate(value):
+        pair = isinstance(point, list) and len(point) == 2
+        if not pair or not all(_is_number(x) and abs(x) <= LARGEST for x in point):
+            raise PartError((index,), point, f"[t, value], two finite numbers {RANGE}")
+    if len(value) > POINTS_MAX:
+        raise ValueError(f"{len(value)} points, allowed: up to {POINTS_MAX}")
+    _check_times(value)
+    return tuple((float(time), float(one)) for time, one in value)
 
 
 SHARES = {"torque_share": "torque_Nm", "speed_share": "speed_rpm"}
@@ -104,9 +111,11 @@ class Profile(Strict):
         for share, absolute in SHARES.items():
             if {share, absolute} <= self.given():
                 raise ValueError(f"profile.{share} and profile.{absolute}: give one of the two")
-        for _, value in self.torque_share or ():
+        points = self.torque_share or ()
+        for index, (time, value) in enumerate(points):
             if abs(value) > 1.0:
-                raise ValueError(f"profile.torque_share = {value:g}, allowed: -1 to 1 (of the motor's torque_max_Nm)")
+                raise PartError(*(("torque_share",), value) if len(points) == 1 else
+                                (("torque_share", index), [time, value]), SHARE_ALLOWED)  # fmt: skip
         return self
 
     def key(self, name: str) -> str:
