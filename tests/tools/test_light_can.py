@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""python-can without asammdf: not loaded where nobody needs it, complete where somebody does. A process for each,
-because what a process has imported stays."""
+"""python-can is imported without asammdf, and is complete once its reader of MDF4 files is asked for.
+
+Each import has a process of its own, because what a process has imported stays.
+"""
 
 import subprocess
 import sys
