@@ -8,6 +8,7 @@
  *   outputs_lost(): the controller was reset in this period, so that no gate is on from here on; may be NULL
  *   gate_fault(): tells before each step whether the gate drivers have blocked a short circuit; may be NULL
  *   known_voltage(): tells before each step what the converters read of a known voltage, 1: right; may be NULL
+ *   handle(), get_by(): the same as get() in two steps, so that a recorded name is searched once; both may be NULL
  * Errors   set() returns a SIM_ code; get() of an unknown name returns NaN; failure() returns NULL, or the reason why
  *          no further step can be run, and may itself be NULL
  * Context  host; owned by the runner, which destroys it */
@@ -27,6 +28,8 @@ typedef struct {
     void (*gate_fault)(void *self, bool reported);
     bool (*outputs_lost)(const void *self);
     void (*known_voltage)(void *self, double share);
+    int (*handle)(const char *name);
+    double (*get_by)(const void *self, int handle);
 } sim_controller_t;
 
 /** Takes ownership of the controller, also if it returns NULL (out of memory). */

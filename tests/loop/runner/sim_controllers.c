@@ -21,6 +21,11 @@ static double firmware_get(const void *self, const char *name)
     return fluxtrue_get(self, name);
 }
 
+static double firmware_get_by(const void *self, int handle)
+{
+    return fluxtrue_get_by(self, handle);
+}
+
 static void firmware_destroy(void *self)
 {
     fluxtrue_destroy(self);
@@ -78,7 +83,8 @@ static void twin_destroy_(void *self)
 static sim_t *create_around(fluxtrue_t *firmware, void (*destroy)(void *self))
 {
     return sim_create_with((sim_controller_t){firmware, firmware_step, firmware_set, firmware_get, NULL, destroy,
-                                              firmware_switches, firmware_gate_fault, NULL, firmware_known_voltage});
+                                              firmware_switches, firmware_gate_fault, NULL, firmware_known_voltage,
+                                              fluxtrue_handle, firmware_get_by});
 }
 
 sim_t *sim_create(int controller)
@@ -88,7 +94,7 @@ sim_t *sim_create(int controller)
     }
     if (controller == SIM_TWIN) {
         return sim_create_with((sim_controller_t){twin_create(), twin_step_, twin_set_, twin_get_, NULL, twin_destroy_,
-                                                  NULL, NULL, NULL, NULL});
+                                                  NULL, NULL, NULL, NULL, NULL, NULL});
     }
     return NULL;
 }

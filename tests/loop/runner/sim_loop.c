@@ -21,6 +21,7 @@ static int channel_resolve(const sim_t *sim, const char *name, channel_t *channe
     }
     if (channel->index < 0) {
         channel->source = FROM_CONTROLLER;
+        channel->index = sim->controller.handle != NULL ? sim->controller.handle(name) : -1;
         return isnan(sim->controller.get(sim->controller.self, name)) ? SIM_UNKNOWN_NAME : SIM_OK;
     }
     return SIM_OK;
@@ -128,12 +129,18 @@ static bool row_collect(sim_t *sim)
     return sim->in_row == sim->every;
 }
 
+static double controller_read(const sim_controller_t *controller, const channel_t *channel)
+{
+    return controller->get_by != NULL ? controller->get_by(controller->self, channel->index)
+                                      : controller->get(controller->self, channel->name);
+}
+
 static void row_write(sim_t *sim, double *row)
 {
     for (int i = 0; i < sim->channels; i++) {
         const channel_t *channel = &sim->channel[i];
         if (channel->source == FROM_CONTROLLER) {
-            row[i] = sim->controller.get(sim->controller.self, channel->name);
+            row[i] = controller_read(&sim->controller, channel);
         } else if (channel->source == FROM_PLANT) {
             row[i] = sim_plant_read(plant_params(sim->plant), channel->index);
         } else if (sim_truth_averages(channel->index)) {

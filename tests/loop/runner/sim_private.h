@@ -12,7 +12,7 @@ typedef enum { FROM_TRUTH, FROM_PLANT, FROM_CONTROLLER } source_t;
 
 typedef struct {
     source_t source;
-    int index;
+    int index; /* of a controller's channel: its handle, if the controller has handles */
     double sum;
     char name[NAME_MAX_LENGTH];
 } channel_t;

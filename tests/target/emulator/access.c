@@ -61,8 +61,8 @@ uint32_t emu_resolver_angle(const emu_t *emu)
 
 emu_line_t emu_line(const emu_t *emu, unsigned line)
 {
-    const bool connected = (bus_get(emu, bus_find("PORTC"), 4U * line) >> 8 & 7U) == 1U;
-    const peripheral_t *port = bus_find("PTC");
+    const bool connected = (bus_get(emu, PERIPHERAL(PORTC), 4U * line) >> 8 & 7U) == 1U;
+    const peripheral_t *port = PERIPHERAL(PTC);
     if (!connected || (bus_get(emu, port, PDDR) >> line & 1U) == 0U) {
         return EMU_LINE_RELEASED;
     }

@@ -43,7 +43,7 @@ enum {
 
 static const peripheral_t *of(int instance)
 {
-    return bus_find(instance == 0 ? "ADC0" : "ADC1");
+    return instance == 0 ? PERIPHERAL(ADC0) : PERIPHERAL(ADC1);
 }
 
 bool adc_models(uint32_t offset)
@@ -151,7 +151,7 @@ void adc_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t
 bool adc_pretrigger(emu_t *emu, int instance, int channel)
 {
     const peripheral_t *self = of(instance);
-    const bool listens = (bus_get(emu, bus_find("PCC"), self->gate) & 1U << 30) != 0 &&
+    const bool listens = (bus_get(emu, PERIPHERAL(PCC), self->gate) & 1U << 30) != 0 &&
                          (bus_get(emu, self, SC2) & 0x40U) != 0;
     return listens && emu->s.adc[instance].current == 0 && start(emu, self, channel);
 }

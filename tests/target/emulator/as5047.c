@@ -77,7 +77,7 @@ static uint32_t on_the_line(const as5047_t *device)
 
 static void check_timing(emu_t *emu)
 {
-    const peripheral_t *spi = bus_find("LPSPI0");
+    const peripheral_t *spi = PERIPHERAL(LPSPI0);
     const uint32_t clock = clocks_peripheral_ticks(emu, spi->gate), ccr = bus_get(emu, spi, CCR);
     if (clock * ((ccr & 0xFFU) + 2U) < BIT_TICKS || clock * ((ccr >> 16 & 0xFFU) + 1U) < SELECT_TICKS ||
         clock * ((ccr >> 8 & 0xFFU) + 2U) < SELECT_TICKS) {

@@ -8,42 +8,43 @@
 
 enum { PAGE = 0x1000, GPIO_PAGE = 0xFF, GPIO_STEP = 0x40 };
 
-#define ON(kind) kind##_models, kind##_read, kind##_written
+#define ROW(name, kind, gate, instance, narrow) \
+    [PERIPHERAL_##name] = {#name, kind##_models, kind##_read, kind##_written, gate, instance, narrow}
 
 /* clang-format off */
 const peripheral_t peripherals[] = {
-    {"SCG",    ON(scg),    0,     0, false},
-    {"PCC",    ON(pcc),    0,     0, false},
-    {"SMC",    ON(smc),    0,     0, false},
-    {"PMC",    ON(pmc),    0,     0, false},
-    {"RCM",    ON(rcm),    0,     0, false},
-    {"SIM",    ON(sim),    0,     0, false},
-    {"TRGMUX", ON(trgmux), 0,     0, false},
-    {"FTM0",   ON(ftm),    0xE0,  0, false},
-    {"FTM2",   ON(ftm),    0xE8,  1, false},
-    {"PDB0",   ON(pdb),    0xD8,  0, false},
-    {"PDB1",   ON(pdb),    0xC4,  1, false},
-    {"ADC0",   ON(adc),    0xEC,  0, false},
-    {"ADC1",   ON(adc),    0x9C,  1, false},
-    {"LPIT0",  ON(lpit),   0xDC,  0, false},
-    {"LPSPI0", ON(lpspi),  0xB0,  0, false},
-    {"LPSPI1", ON(lpspi),  0xB4,  1, false},
-    {"LPSPI2", ON(lpspi),  0xB8,  2, false},
-    {"CAN0",   ON(can),    0x90,  0, true},
-    {"WDOG",   ON(wdog),   0,     0, false},
-    {"PORTA",  ON(port),   0x124, 0, false},
-    {"PORTB",  ON(port),   0x128, 1, false},
-    {"PORTC",  ON(port),   0x12C, 2, false},
-    {"PORTD",  ON(port),   0x130, 3, false},
-    {"PORTE",  ON(port),   0x134, 4, false},
-    {"PTA",    ON(gpio),   0,     0, false},
-    {"PTB",    ON(gpio),   0,     1, false},
-    {"PTC",    ON(gpio),   0,     2, false},
-    {"PTD",    ON(gpio),   0,     3, false},
-    {"PTE",    ON(gpio),   0,     4, false},
-    {"LMEM",   ON(lmem),   0,     0, false},
-    {"FTFC",   ON(ftfc),   0x80,  0, false},
-    {"MSCM",   ON(mscm),   0,     0, false},
+    ROW(SCG,    scg,    0,     0, false),
+    ROW(PCC,    pcc,    0,     0, false),
+    ROW(SMC,    smc,    0,     0, false),
+    ROW(PMC,    pmc,    0,     0, false),
+    ROW(RCM,    rcm,    0,     0, false),
+    ROW(SIM,    sim,    0,     0, false),
+    ROW(TRGMUX, trgmux, 0,     0, false),
+    ROW(FTM0,   ftm,    0xE0,  0, false),
+    ROW(FTM2,   ftm,    0xE8,  1, false),
+    ROW(PDB0,   pdb,    0xD8,  0, false),
+    ROW(PDB1,   pdb,    0xC4,  1, false),
+    ROW(ADC0,   adc,    0xEC,  0, false),
+    ROW(ADC1,   adc,    0x9C,  1, false),
+    ROW(LPIT0,  lpit,   0xDC,  0, false),
+    ROW(LPSPI0, lpspi,  0xB0,  0, false),
+    ROW(LPSPI1, lpspi,  0xB4,  1, false),
+    ROW(LPSPI2, lpspi,  0xB8,  2, false),
+    ROW(CAN0,   can,    0x90,  0, true),
+    ROW(WDOG,   wdog,   0,     0, false),
+    ROW(PORTA,  port,   0x124, 0, false),
+    ROW(PORTB,  port,   0x128, 1, false),
+    ROW(PORTC,  port,   0x12C, 2, false),
+    ROW(PORTD,  port,   0x130, 3, false),
+    ROW(PORTE,  port,   0x134, 4, false),
+    ROW(PTA,    gpio,   0,     0, false),
+    ROW(PTB,    gpio,   0,     1, false),
+    ROW(PTC,    gpio,   0,     2, false),
+    ROW(PTD,    gpio,   0,     3, false),
+    ROW(PTE,    gpio,   0,     4, false),
+    ROW(LMEM,   lmem,   0,     0, false),
+    ROW(FTFC,   ftfc,   0x80,  0, false),
+    ROW(MSCM,   mscm,   0,     0, false),
 };
 /* clang-format on */
 const int peripherals_count = (int)(sizeof peripherals / sizeof peripherals[0]);
@@ -96,17 +97,7 @@ void bus_reset(emu_t *emu)
             emu->s.value[p][r] = emu->facts_of[p]->fact[r].reset;
         }
     }
-    bus_put(emu, bus_find("RCM"), 8, emu->s.reset_cause != 0 ? emu->s.reset_cause : 0x82U);
-}
-
-const peripheral_t *bus_find(const char *name)
-{
-    for (int p = 0; p < peripherals_count; p++) {
-        if (strcmp(peripherals[p].name, name) == 0) {
-            return &peripherals[p];
-        }
-    }
-    return NULL;
+    bus_put(emu, PERIPHERAL(RCM), 8, emu->s.reset_cause != 0 ? emu->s.reset_cause : 0x82U);
 }
 
 uint32_t bus_get(const emu_t *emu, const peripheral_t *peripheral, uint32_t offset)
@@ -131,7 +122,7 @@ typedef struct {
 static bool clocked(const emu_t *emu, const peripheral_t *peripheral)
 {
     const uint32_t cgc = 1U << 30;
-    return peripheral->gate == 0 || (bus_get(emu, bus_find("PCC"), peripheral->gate) & cgc) != 0;
+    return peripheral->gate == 0 || (bus_get(emu, PERIPHERAL(PCC), peripheral->gate) & cgc) != 0;
 }
 
 /* False: the access is refused, and the emulation stops with the reason. */

@@ -57,7 +57,7 @@ enum {
 
 static const peripheral_t *can0(void)
 {
-    return bus_find("CAN0");
+    return PERIPHERAL(CAN0);
 }
 
 bool can_models(uint32_t offset)
@@ -248,7 +248,7 @@ static void control_written(emu_t *emu, uint32_t old, uint32_t value)
         emu_fail(emu, "write of CAN0.MCR: the bits 0x%x can be written in freeze mode only", kept);
     }
     if (running(emu)) {
-        pins_check(emu, "CAN0");
+        pins_check(emu, PERIPHERAL(CAN0));
     }
     if (running(emu) && !memory_filled(emu)) {
         emu_fail(emu, "write of CAN0.MCR: its message memory has not been initialised");

@@ -64,7 +64,7 @@ static uint32_t control_of(int source)
 
 static bool enabled(const emu_t *emu, int source)
 {
-    return (bus_get(emu, bus_find("SCG"), control_of(source)) & ENABLED) != 0;
+    return (bus_get(emu, PERIPHERAL(SCG), control_of(source)) & ENABLED) != 0;
 }
 
 static bool source_on(const emu_t *emu, int source)
@@ -96,7 +96,7 @@ static void source_started(emu_t *emu, uint32_t offset, bool was_on)
 /* (PREDIV, MULT) of 8 MHz: f = 8 MHz (MULT + 16) / (PREDIV + 1) / 2; 0: no whole number of ticks. */
 static uint32_t spll_ticks(const emu_t *emu)
 {
-    const uint32_t cfg = bus_get(emu, bus_find("SCG"), SPLLCFG);
+    const uint32_t cfg = bus_get(emu, PERIPHERAL(SCG), SPLLCFG);
     const uint32_t numerator = CRYSTAL_TICKS * 2U * ((cfg >> 8 & 7U) + 1U), divisor = (cfg >> 16 & 31U) + 16U;
     return numerator % divisor == 0U ? numerator / divisor : 0U;
 }
@@ -116,20 +116,20 @@ uint32_t clocks_async_ticks(const emu_t *emu, int source, int divider)
     if (ticks == 0) {
         return 0;
     }
-    const uint32_t code = bus_get(emu, bus_find("SCG"), control_of(source) + 4U) >> (divider == 2 ? 8 : 0) & 7U;
+    const uint32_t code = bus_get(emu, PERIPHERAL(SCG), control_of(source) + 4U) >> (divider == 2 ? 8 : 0) & 7U;
     return code == 0 ? 0U : ticks << (code - 1U);
 }
 
 uint32_t clocks_peripheral_ticks(const emu_t *emu, uint32_t pcc_offset)
 {
-    return clocks_async_ticks(emu, (int)(bus_get(emu, bus_find("PCC"), pcc_offset) >> 24 & 7U), 2);
+    return clocks_async_ticks(emu, (int)(bus_get(emu, PERIPHERAL(PCC), pcc_offset) >> 24 & 7U), 2);
 }
 
 /* ---- the core's clock ---- */
 
 static bool high_speed(const emu_t *emu)
 {
-    return (bus_get(emu, bus_find("SMC"), PMCTRL) >> 5 & 3U) == 3U;
+    return (bus_get(emu, PERIPHERAL(SMC), PMCTRL) >> 5 & 3U) == 3U;
 }
 
 bool clocks_high_speed(const emu_t *emu)
@@ -139,7 +139,7 @@ bool clocks_high_speed(const emu_t *emu)
 
 static uint32_t selected(const emu_t *emu)
 {
-    return bus_get(emu, bus_find("SCG"), high_speed(emu) ? HCCR : RCCR);
+    return bus_get(emu, PERIPHERAL(SCG), high_speed(emu) ? HCCR : RCCR);
 }
 
 /* In high-speed run no clock may change by more than a factor of two at once. */
@@ -200,7 +200,7 @@ void scg_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t
         emu_fail(emu, "write of SCG.SPLLCFG while the PLL runs: it has no effect");
     } else if (offset == SPLLCSR && (value & ENABLED) != 0 && spll_ticks(emu) == 0) {
         emu_fail(emu, "SCG: the PLL's frequency is no whole number of ticks");
-    } else if (offset == SOSCCFG && (bus_get(emu, bus_find("SCG"), SOSCCSR) & ENABLED) != 0 && old != value) {
+    } else if (offset == SOSCCFG && (bus_get(emu, PERIPHERAL(SCG), SOSCCSR) & ENABLED) != 0 && old != value) {
         emu_fail(emu, "write of SCG.SOSCCFG while the oscillator runs: it has no effect");
     } else if (offset == RCCR || offset == HCCR) {
         core_update(emu);

@@ -168,13 +168,8 @@ static uint8_t conditional(const uint8_t it[2])
     return slots;
 }
 
-static block_t block_at(emu_t *emu, uint32_t address, uint32_t size)
+static __attribute__((noinline)) block_t block_read(emu_t *emu, uint32_t address, uint32_t size)
 {
-    const uint32_t place = code_place(address);
-    block_t *known = place < CODE_SIZE / 2 ? &emu->block[place] : NULL;
-    if (known != NULL && known->size == size) {
-        return *known;
-    }
     uint8_t code[4096];
     block_t block = {.size = (uint16_t)size, .count = 1};
     if (size <= sizeof code && uc_mem_read(emu->uc, address, code, size) == UC_ERR_OK) {
@@ -182,10 +177,21 @@ static block_t block_at(emu_t *emu, uint32_t address, uint32_t size)
         block.conditional = size == 2U ? conditional(code) : (uint8_t)0;
         block.idle = size == 2U && (code[0] | code[1] << 8) == BRANCH_TO_ITSELF;
     }
-    if (known != NULL) {
-        *known = block;
-    }
     return block;
+}
+
+/* In line but for reading the code: this is called before each block that runs. */
+static inline block_t block_at(emu_t *emu, uint32_t address, uint32_t size)
+{
+    const uint32_t place = code_place(address);
+    if (place >= CODE_SIZE / 2) {
+        return block_read(emu, address, size);
+    }
+    block_t *known = &emu->block[place];
+    if (known->size != size) {
+        *known = block_read(emu, address, size);
+    }
+    return *known;
 }
 
 void emu_code_changed(emu_t *emu, uint32_t address, uint32_t size)

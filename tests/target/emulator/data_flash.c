@@ -102,14 +102,14 @@ void data_flash_program_cut(emu_t *emu, uint32_t address, const uint8_t data[DAT
 
 static bool is_cached(const emu_t *emu)
 {
-    const peripheral_t *cache = bus_find("LMEM");
+    const peripheral_t *cache = PERIPHERAL(LMEM);
     const uint32_t control = bus_get(emu, cache, 0), regions = bus_get(emu, cache, DATA_FLASH_PCCRMR);
     return (control & ENCACHE) != 0U && (regions >> 26 & 3U) != 0U;
 }
 
 static bool is_speculated(const emu_t *emu)
 {
-    return (bus_get(emu, bus_find("MSCM"), OCMDR1) & SPECULATION_OFF) != SPECULATION_OFF;
+    return (bus_get(emu, PERIPHERAL(MSCM), OCMDR1) & SPECULATION_OFF) != SPECULATION_OFF;
 }
 
 static void check_caches(emu_t *emu, uint32_t offset)

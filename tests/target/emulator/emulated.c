@@ -322,8 +322,8 @@ sim_t *sim_create_emulated(const char *elf, const char *layout, int mode, char *
         destroy(e);
         return NULL;
     }
-    return sim_create_with(
-        (sim_controller_t){e, step, set, get, failure, destroy, switches, gate_report, outputs_lost, known_voltage});
+    return sim_create_with((sim_controller_t){e, step, set, get, failure, destroy, switches, gate_report, outputs_lost,
+                                              known_voltage, NULL, NULL});
 }
 
 emu_t *sim_emulator(sim_t *sim)

@@ -55,7 +55,7 @@ enum {
 
 static const peripheral_t *ftfc(void)
 {
-    return bus_find("FTFC");
+    return PERIPHERAL(FTFC);
 }
 
 bool ftfc_models(uint32_t offset)

@@ -24,7 +24,7 @@ enum { INIT_TRIGGER = 22, C2SC = C0SC + 16, C2V = C0V + 16, CHF = 0x80 };
 
 static const peripheral_t *of(int instance)
 {
-    return bus_find(instance == 0 ? "FTM0" : "FTM2");
+    return instance == 0 ? PERIPHERAL(FTM0) : PERIPHERAL(FTM2);
 }
 
 bool ftm_models(uint32_t offset)
@@ -80,7 +80,7 @@ static bool index_rose(const emu_t *emu, uint32_t from, int32_t moved)
 /* Channel 2 has the pin of the index and captures its rising edge (ELSA). */
 static bool captures_index(const emu_t *emu, const peripheral_t *self)
 {
-    const uint32_t function = bus_get(emu, bus_find("PORTD"), 4U * EMU_INDEX) >> 8 & 7U;
+    const uint32_t function = bus_get(emu, PERIPHERAL(PORTD), 4U * EMU_INDEX) >> 8 & 7U;
     return decoding(emu, self) && function == 2U && (bus_get(emu, self, C2SC) & 0x3CU) == 4U;
 }
 
@@ -148,7 +148,7 @@ static void start_or_stop(emu_t *emu, const peripheral_t *self)
     ftm_t *f = &emu->s.ftm[self->instance];
     const bool wanted = clock_ticks(emu, self) != 0 && !decoding(emu, self);
     if (clock_ticks(emu, self) != 0 && !f->running) {
-        pins_check(emu, self->name);
+        pins_check(emu, self);
     }
     if (wanted && !f->running) {
         f->running = true;
@@ -342,7 +342,7 @@ static void hardware_trigger(emu_t *emu)
 {
     const peripheral_t *self = ftm0();
     const uint32_t sync = bus_get(emu, self, SYNC), conf = bus_get(emu, self, SYNCONF);
-    const bool connected = (bus_get(emu, bus_find("TRGMUX"), 0x28) & 0x3FU) == INIT_TRIGGER;
+    const bool connected = (bus_get(emu, PERIPHERAL(TRGMUX), 0x28) & 0x3FU) == INIT_TRIGGER;
     if (!connected || (sync & 0x10U) == 0) {
         return;
     }

@@ -41,7 +41,7 @@ enum {
 
 static inline const peripheral_t *ftm0(void)
 {
-    return bus_find("FTM0");
+    return PERIPHERAL(FTM0);
 }
 
 /** ftm_fault.c. A register of the fault control was written; a period of FTM0 begins. */

@@ -96,7 +96,7 @@ void lpit_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
 
 void lpit_fire(emu_t *emu, int channel)
 {
-    const peripheral_t *self = bus_find("LPIT0");
+    const peripheral_t *self = PERIPHERAL(LPIT0);
     bus_put(emu, self, MSR, bus_get(emu, self, MSR) | 1U << channel);
     start(emu, self, (uint32_t)channel);
     lines_update(emu, self);

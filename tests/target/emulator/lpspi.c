@@ -152,7 +152,7 @@ static void request_ended(emu_t *emu, const peripheral_t *self, uint64_t now)
 
 void lpspi_request(emu_t *emu, int instance, bool level)
 {
-    const peripheral_t *self = bus_find(instance == 0 ? "LPSPI0" : "LPSPI1");
+    const peripheral_t *self = instance == 0 ? PERIPHERAL(LPSPI0) : PERIPHERAL(LPSPI1);
     spi_t *spi = &emu->s.spi[instance];
     const uint64_t now = emu_instant(emu);
     if (level == spi->requested || (bus_get(emu, self, CFGR0) & HREN) == 0 || (bus_get(emu, self, CR) & MEN) == 0) {
@@ -197,7 +197,7 @@ void lpspi_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32
         spi->tx_count = (value & (RESET | RTF)) != 0 ? 0 : spi->tx_count;
         bus_put(emu, self, CR, value & ~(uint32_t)(RTF | RRF));
         if ((value & MEN) != 0) {
-            pins_check(emu, self->name);
+            pins_check(emu, self);
         }
     } else if (offset == CFGR1 && (old ^ value) != 0 && (bus_get(emu, self, CR) & MEN) != 0) {
         emu_fail(emu, "write of %s.CFGR1: the module is enabled", self->name);
@@ -254,7 +254,7 @@ uint32_t rdc_transfer(emu_t *emu, uint64_t begin, uint32_t sent, uint32_t bits)
     if (begin < emu->s.rdc.sampled_at + RDC_READY) {
         emu_fail(emu, "the AD2S1210 is read sooner than 6 of its clocks after SAMPLE fell");
     }
-    const uint32_t lines = bus_get(emu, bus_find("PTC"), 0);
+    const uint32_t lines = bus_get(emu, PERIPHERAL(PTC), 0);
     const bool a0 = (lines >> EMU_RDC_A0 & 1U) != 0, a1 = (lines >> EMU_RDC_A1 & 1U) != 0;
     if (a0 && a1) {
         return rdc_configure(emu, sent, bits);

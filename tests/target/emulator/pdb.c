@@ -54,7 +54,7 @@ enum {
 
 static const peripheral_t *of(int instance)
 {
-    return bus_find(instance == 0 ? "PDB0" : "PDB1");
+    return instance == 0 ? PERIPHERAL(PDB0) : PERIPHERAL(PDB1);
 }
 
 bool pdb_models(uint32_t offset)
@@ -212,7 +212,7 @@ void pdb_trigger(emu_t *emu, int instance)
     const peripheral_t *self = of(instance);
     pdb_t *p = &emu->s.pdb[instance];
     const uint32_t c1 = bus_get(emu, self, C1);
-    if ((bus_get(emu, self, SC) & PDBEN) == 0 || (bus_get(emu, bus_find("PCC"), self->gate) & 1U << 30) == 0) {
+    if ((bus_get(emu, self, SC) & PDBEN) == 0 || (bus_get(emu, PERIPHERAL(PCC), self->gate) & 1U << 30) == 0) {
         return;
     }
     p->running = true;

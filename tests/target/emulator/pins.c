@@ -15,8 +15,6 @@
  * GPIO: PDIR is the level of a digital pin   | yes      | test_a_pin_reads_what_the_timer_drives
  * GPIO: levels from outside                  | no       | -
  */
-#include <string.h>
-
 #include "emu_private.h"
 
 enum {
@@ -40,40 +38,46 @@ enum {
 
 /* The pins and pin functions that a peripheral needs, from the manufacturer's table of signal multiplexing. */
 static const struct {
-    const char *peripheral, *port;
-    uint8_t pin, function;
+    uint8_t peripheral, port, pin, function;
 } wiring[] = {
-    {"FTM0", "PORTD", 15, 2},  {"FTM0", "PORTD", 16, 2},  {"FTM0", "PORTD", 0, 2},   {"FTM0", "PORTD", 1, 2},
-    {"FTM0", "PORTB", 4, 2},   {"FTM0", "PORTB", 5, 2},   {"FTM0", "PORTE", 8, 2},   {"FTM0", "PORTA", 14, 2},
-    {"FTM2", "PORTD", 10, 3},  {"FTM2", "PORTD", 11, 3},  {"CAN0", "PORTE", 4, 5},   {"CAN0", "PORTE", 5, 5},
-    {"LPSPI0", "PORTB", 0, 3}, {"LPSPI0", "PORTB", 1, 3}, {"LPSPI0", "PORTB", 2, 3}, {"LPSPI0", "PORTB", 3, 3},
+#define PIN(peripheral, port, pin, function) {PERIPHERAL_##peripheral, PERIPHERAL_##port, pin, function}
+    PIN(FTM0, PORTD, 15, 2),  PIN(FTM0, PORTD, 16, 2),  PIN(FTM0, PORTD, 0, 2),   PIN(FTM0, PORTD, 1, 2),
+    PIN(FTM0, PORTB, 4, 2),   PIN(FTM0, PORTB, 5, 2),   PIN(FTM0, PORTE, 8, 2),   PIN(FTM0, PORTA, 14, 2),
+    PIN(FTM2, PORTD, 10, 3),  PIN(FTM2, PORTD, 11, 3),  PIN(CAN0, PORTE, 4, 5),   PIN(CAN0, PORTE, 5, 5),
+    PIN(LPSPI0, PORTB, 0, 3), PIN(LPSPI0, PORTB, 1, 3), PIN(LPSPI0, PORTB, 2, 3), PIN(LPSPI0, PORTB, 3, 3),
 };
 
-static void check_pin(emu_t *emu, const char *peripheral, const char *port, uint32_t pin, uint32_t function)
+static void check_pin(emu_t *emu, const peripheral_t *user, const peripheral_t *port, uint32_t pin, uint32_t function)
 {
-    if ((bus_get(emu, bus_find(port), 4U * pin) >> 8 & 7U) != function) {
-        emu_fail(emu, "%s is used, but %s.PCR%u does not give it the pin (MUX %u)", peripheral, port, pin, function);
+    if ((bus_get(emu, port, 4U * pin) >> 8 & 7U) != function) {
+        emu_fail(emu, "%s is used, but %s.PCR%u does not give it the pin (MUX %u)", user->name, port->name, pin,
+                 function);
     }
 }
 
-void pins_check(emu_t *emu, const char *peripheral)
+void pins_check(emu_t *emu, const peripheral_t *peripheral)
 {
     for (size_t k = 0; k < sizeof wiring / sizeof wiring[0]; k++) {
-        if (strcmp(wiring[k].peripheral, peripheral) == 0) {
-            check_pin(emu, peripheral, wiring[k].port, wiring[k].pin, wiring[k].function);
+        if (&peripherals[wiring[k].peripheral] == peripheral) {
+            check_pin(emu, peripheral, &peripherals[wiring[k].port], wiring[k].pin, wiring[k].function);
         }
     }
+}
+
+/* The port that gives the pins of this GPIO their functions. */
+static const peripheral_t *port_of(const peripheral_t *gpio)
+{
+    return PERIPHERAL(PORTA) + (gpio - PERIPHERAL(PTA));
 }
 
 /* A line that is switched on must be an output, and its pin must be connected to the GPIO. */
 static void check_lines(emu_t *emu, const peripheral_t *self, uint32_t lines)
 {
-    const char port[] = {'P', 'O', 'R', 'T', self->name[2], '\0'};
     for (uint32_t pin = 0; pin < 32U; pin++) {
         if ((lines >> pin & 1U) == 0) {
             continue;
         }
-        check_pin(emu, self->name, port, pin, 1);
+        check_pin(emu, self, port_of(self), pin, 1);
         if ((bus_get(emu, self, PDDR) >> pin & 1U) == 0) {
             emu_fail(emu, "%s: line %u is switched on, but it is an input (PDDR)", self->name, pin);
         }
@@ -117,13 +121,12 @@ void port_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
 }
 
 /* The level of FTM0's outputs 0 ... 5 at the pins of a port that they are given to. */
-static uint32_t timer_levels(const emu_t *emu, const char *port, uint32_t of_gpio)
+static uint32_t timer_levels(const emu_t *emu, const peripheral_t *port, uint32_t of_gpio)
 {
     const uint32_t outputs = ftm_levels(emu);
     for (uint32_t k = 0; k < EMU_PWM_CHANNELS; k++) {
         const uint32_t pin = wiring[k].pin;
-        if (strcmp(wiring[k].port, port) == 0 &&
-            (bus_get(emu, bus_find(port), 4U * pin) >> 8 & 7U) == wiring[k].function) {
+        if (&peripherals[wiring[k].port] == port && (bus_get(emu, port, 4U * pin) >> 8 & 7U) == wiring[k].function) {
             of_gpio = (of_gpio & ~(1U << pin)) | (outputs >> k & 1U) << pin;
         }
     }
@@ -132,9 +135,8 @@ static uint32_t timer_levels(const emu_t *emu, const char *port, uint32_t of_gpi
 
 static uint32_t levels(const emu_t *emu, const peripheral_t *self)
 {
-    const char port[] = {'P', 'O', 'R', 'T', self->name[2], '\0'};
     const uint32_t index = self->name[2] == 'D' && ftm_index(emu) ? 1U << EMU_INDEX : 0U;
-    return index | timer_levels(emu, port, bus_get(emu, self, PDOR) & bus_get(emu, self, PDDR));
+    return index | timer_levels(emu, port_of(self), bus_get(emu, self, PDOR) & bus_get(emu, self, PDDR));
 }
 
 bool gpio_models(uint32_t offset)
@@ -185,7 +187,7 @@ void trgmux_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint3
 
 void trgmux_event(emu_t *emu, uint32_t source)
 {
-    const peripheral_t *self = bus_find("TRGMUX");
+    const peripheral_t *self = PERIPHERAL(TRGMUX);
     if ((bus_get(emu, self, TO_PDB0) & 0x3FU) == source) {
         pdb_trigger(emu, 0);
     }
@@ -197,7 +199,7 @@ void trgmux_event(emu_t *emu, uint32_t source)
 void trgmux_level(emu_t *emu, uint32_t source, bool level)
 {
     static const uint32_t target[2] = {TO_LPSPI0, TO_LPSPI1};
-    const peripheral_t *self = bus_find("TRGMUX");
+    const peripheral_t *self = PERIPHERAL(TRGMUX);
     for (int instance = 0; instance < 2; instance++) {
         if ((bus_get(emu, self, target[instance]) & 0x3FU) == source) {
             lpspi_request(emu, instance, level);

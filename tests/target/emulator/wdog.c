@@ -64,7 +64,7 @@ uint32_t wdog_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32
 
 void wdog_restart(emu_t *emu)
 {
-    const peripheral_t *self = bus_find("WDOG");
+    const peripheral_t *self = PERIPHERAL(WDOG);
     const bool runs = (bus_get(emu, self, CS) & EN) != 0;
     emu->s.wdog.start = emu->s.now;
     emu_timer(emu, TIMER_WDOG, runs ? emu->s.now + bus_get(emu, self, TOVAL) * clock_ticks(emu, self) : NEVER);

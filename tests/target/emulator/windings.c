@@ -61,7 +61,7 @@ void windings_follow(emu_t *emu, uint64_t when)
 
 void windings_changed(emu_t *emu)
 {
-    const peripheral_t *timer = bus_find("FTM0");
+    const peripheral_t *timer = PERIPHERAL(FTM0);
     emu->s.windings.forced = bus_get(emu, timer, SWOCTRL);
     emu->s.windings.enabled = (bus_get(emu, timer, SC) & PWMEN6) != 0U;
 }

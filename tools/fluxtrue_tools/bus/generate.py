@@ -10,15 +10,13 @@ One firmware serves every motor, so the code has raw values only: signals with a
 with the motor take their factor from the motor data (bus_scales_t).
 """
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from math import gcd
 from pathlib import Path
 
 import cantools
 import click
-from cantools.database.can import Database, Message
+from cantools.database.can import Database, Message, c_source
 from cantools.database.can.c_source import camel_to_snake_case
 from cantools.database.can.signal import Signal
 
@@ -208,6 +206,18 @@ def narrow(source: Path, database: Database) -> None:
         write_text(source, text.replace(WIDE, NARROW).replace(*CASTS))
 
 
+def _packing(source: Path, node: str) -> tuple[str, str]:
+    """Header and source as `cantools generate_c_source --use-float --use-round` writes them.
+
+    Its command line would load all its commands first, among them one that draws with Matplotlib.
+    """
+    database = cantools.database.load_file(source)
+    header, code, *_fuzzer = c_source.generate(
+        database, PREFIX, f"{PREFIX}.h", f"{PREFIX}.c", "", True, False, True, node, True
+    )
+    return header, code
+
+
 def generate(dbc: Path, out: Path, node: str) -> None:
     """Writes bus.[ch], signals.h and exports.c to out/bus, and there the DBC they are made from."""
     raw = in_raw_values(dbc.read_text(encoding="utf-8"))
@@ -218,9 +228,9 @@ def generate(dbc: Path, out: Path, node: str) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     source = folder / "raw.dbc"
     write_text(source, raw)
-    subprocess.run([sys.executable, "-m", "cantools", "generate_c_source", "--use-float", "--use-round",
-                    "--node", node, "--database-name", PREFIX, "--output-directory", str(folder), str(source)],
-                   check=True, stdout=subprocess.DEVNULL)  # fmt: skip
+    packed, packing = _packing(source, node)
+    write_text(folder / "bus.h", packed)
+    write_text(folder / "bus.c", packing)
     narrow(folder / "bus.c", database)
     sent = [message for message in database.messages if node in message.senders]
     received = [message for message in database.messages if node in message.receivers]

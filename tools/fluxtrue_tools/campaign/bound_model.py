@@ -4,7 +4,7 @@
 Units    SI; complex numbers d + jq in the controller's frame; amplitude-invariant
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -21,6 +21,10 @@ STATES: Final = ("resistance", "magnet", "lq", "ld_slope", "cross", "dead_time",
 """Everything uncertain that acts on means over whole turns; factors, but the drop in V and the angle in rad."""
 
 
+KEPT: Final = 40
+"""Sets of currents: a voltage needs four, and eight voltages lie between two that have them in common."""
+
+
 @dataclass(frozen=True)
 class Physics:
     """Constants of the model."""
@@ -30,16 +34,33 @@ class Physics:
     iron_k_e: float
     dead_V: float  # nominal loss of a leg to dead time
     r_ohm: float  # at the reported temperature
+    kept: dict[tuple[tuple[int, ...], bytes], tuple[Array, Array, Array]] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
     def split(self, x: Array) -> dict[str, float]:
         """The state vector by name."""
         return dict(zip(STATES, x, strict=True))
 
+    def _linkages(self, i: Complex) -> tuple[Array, Array, Array]:
+        """Nominal psi_d without i_d, psi_d and psi_q.
+
+        Most columns of a Jacobian begin with the same currents, and those of the states that do not act on the flux
+        have the same ones throughout. Therefore the last ones are kept.
+        """
+        model, key = self.machine.model, (np.shape(i), i.tobytes())
+        if key not in self.kept:
+            while len(self.kept) >= KEPT:
+                del self.kept[next(iter(self.kept))]
+            self.kept[key] = model.psi_d(0.0, i.imag), model.psi_d(i.real, i.imag), model.psi_q(i.real, i.imag)
+        self.kept[key] = self.kept.pop(key)  # the last one used is the last one dropped
+        return self.kept[key]
+
     def _flux(self, s: dict[str, float], i: Complex) -> Complex:
-        model, i_d, i_q = self.machine.model, i.real, i.imag
-        psi_f, axis = model.psi_d(0.0, 0.0), model.psi_d(0.0, i_q)
-        psi_d = s["magnet"] * psi_f + s["cross"] * (axis - psi_f) + s["ld_slope"] * (model.psi_d(i_d, i_q) - axis)
-        return np.asarray(psi_d + 1j * s["lq"] * model.psi_q(i_d, i_q))
+        psi_f = self.machine.model.psi_d(0.0, 0.0)
+        axis, at_d, at_q = self._linkages(i)
+        psi_d = s["magnet"] * psi_f + s["cross"] * (axis - psi_f) + s["ld_slope"] * (at_d - axis)
+        return np.asarray(psi_d + 1j * s["lq"] * at_q)
 
     def _inside(self, s: dict[str, float], i_seen: Complex, omega: Array) -> tuple[Complex, Complex, Complex]:
         """True current (IB-1), magnetising current (IB-2) and flux."""

@@ -11,6 +11,7 @@ from typing import Final
 import can
 import numpy as np
 
+from fluxtrue_tools import light_can
 from fluxtrue_tools.bus.interface import Interface, read_interface
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.foreign import reading
@@ -47,6 +48,8 @@ def load(path: Path) -> Drive:
         raise FluxtrueError(f"{name}: no such file")
     if path.suffix.lower() == MDF4:
         return _of_recording(read_recording(path, name), name)
+    if MDF4 in (suffix.lower() for suffix in path.suffixes):
+        light_can.with_mdf()  # python-can's own reader, for a compressed file
     with reading(name, "a readable log"), can.LogReader(path) as reader:
         frames = list(reader)
     return _drive(frames, name, read_interface())

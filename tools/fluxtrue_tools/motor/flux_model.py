@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator, RectBivariateSpline
 
+from fluxtrue_tools.motor.bicubic import Bicubic, Place
+
 Array = NDArray[np.float64]
 
 
@@ -40,17 +42,17 @@ class ConstantModel:
 class _Surface:
     """One bicubic spline; outside its rectangle it continues with the slope of the edge."""
 
-    def __init__(self, x: Array, y: Array, z: Array) -> None:
-        self.spline = RectBivariateSpline(x, y, z, kx=3, ky=3, s=0)
-        self.box = (x[0], x[-1], y[0], y[-1])
+    def __init__(self, x: Array, y: Array, z: Array, place: Place) -> None:
+        self._spline = Bicubic(RectBivariateSpline(x, y, z, kx=3, ky=3, s=0), place)
+        self._box = (x[0], x[-1], y[0], y[-1])
 
     def __call__(self, x: ArrayLike, y: ArrayLike, nx: int, ny: int) -> Array:
         xa, ya = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
-        xc, yc = np.clip(xa, self.box[0], self.box[1]), np.clip(ya, self.box[2], self.box[3])
-        z = self.spline.ev(xc, yc, dx=nx, dy=ny)
+        xc, yc = np.clip(xa, self._box[0], self._box[1]), np.clip(ya, self._box[2], self._box[3])
+        z = self._spline(xc, yc, nx, ny)
         beyond = (xa != xc) | (ya != yc)
         if (nx, ny) == (0, 0) and np.any(beyond):
-            z = z + (xa - xc) * self.spline.ev(xc, yc, dx=1) + (ya - yc) * self.spline.ev(xc, yc, dy=1)
+            z = z + (xa - xc) * self._spline(xc, yc, 1, 0) + (ya - yc) * self._spline(xc, yc, 0, 1)
         return np.asarray(z, dtype=np.float64)
 
 
@@ -64,20 +66,22 @@ class SplineModel:
     """Bicubic spline through a map of the full i_q plane; exact at the map's nodes."""
 
     def __init__(self, id_A: Array, iq_A: Array, psi_d_Vs: Array, psi_q_Vs: Array) -> None:
-        self._d = _Surface(id_A, iq_A, psi_d_Vs)
-        self._q = _Surface(id_A, iq_A, psi_q_Vs)
+        place = Place()  # of both: they have the same knots
+        self._d = _Surface(id_A, iq_A, psi_d_Vs, place)
+        self._q = _Surface(id_A, iq_A, psi_q_Vs, place)
         self.shape_preserving = False
         if not self._rises(id_A, iq_A):
-            self._d = self._refined(id_A, iq_A, psi_d_Vs)
-            self._q = self._refined(id_A, iq_A, psi_q_Vs)
+            place = Place()
+            self._d = self._refined(id_A, iq_A, psi_d_Vs, place)
+            self._q = self._refined(id_A, iq_A, psi_q_Vs, place)
             self.shape_preserving = True
 
     @staticmethod
-    def _refined(x: Array, y: Array, z: Array) -> _Surface:
+    def _refined(x: Array, y: Array, z: Array, place: Place) -> _Surface:
         parts = 6
         xf, zx = _refine(x, z, 0, parts)
         yf, zxy = _refine(y, zx, 1, parts)
-        return _Surface(xf, yf, zxy)
+        return _Surface(xf, yf, zxy, place)
 
     def _rises(self, id_A: Array, iq_A: Array) -> bool:
         """Whether the spline rises everywhere: both incremental inductances are positive between the nodes, too."""

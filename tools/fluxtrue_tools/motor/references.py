@@ -80,14 +80,14 @@ class Solver:
         i_d, i_q = self.i_max_A * math.cos(angle[best]), self.i_max_A * math.sin(angle[best])
         return float(t[best]), min(i_d, 0.0), i_q
 
-    def _slope(self, d: Array, q: Array) -> Array:
-        m = self.model
-        return 1.5 * self.pole_pairs * (m.psi_d(d, q) + m.psi_d(d, q, nq=1) * q - m.psi_q(d, q, nq=1) * d)
-
     def iq_for(self, t: Array, d: Array, q: Array) -> Array:
         """Newton on torque(d, q) = t from a start that is already near."""
+        m, of_flux = self.model, 1.5 * self.pole_pairs
         for _ in range(3):
-            q = np.maximum(q - (torque(self.model, self.pole_pairs, d, q) - t) / self._slope(d, q), 0.0)
+            psi_d, psi_q = m.psi_d(d, q), m.psi_q(d, q)
+            torque_Nm = np.asarray(of_flux * (psi_d * q - psi_q * d))
+            slope = of_flux * (psi_d + m.psi_d(d, q, nq=1) * q - m.psi_q(d, q, nq=1) * d)
+            q = np.maximum(q - (torque_Nm - t) / slope, 0.0)
         return q
 
     def _start(self, torques: Array) -> Array:

@@ -9,16 +9,19 @@ from collections.abc import Iterable
 from datetime import UTC, datetime
 from hashlib import md5
 from pathlib import Path
+from typing import Final
 
 import can
 import numpy as np
 from asammdf import MDF, Signal
 from asammdf.blocks.v4_blocks import SourceInformation
 from asammdf.blocks.v4_constants import BUS_TYPE_CAN, SOURCE_BUS
-from can.io.mf4 import STD_DTYPE
 
+from fluxtrue_tools import light_can
 from fluxtrue_tools.bus import DBC
 from fluxtrue_tools.bus.interface import Interface
+
+STD_DTYPE: Final = light_can.with_mdf().STD_DTYPE
 
 
 class Group:
