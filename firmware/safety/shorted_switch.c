@@ -9,7 +9,7 @@
 #define PHASES 3
 /* Voltages are 2 pi/8 times per unit, r six times that. */
 #define EIGHTH_OF_TURN Q15(0.78539816339744831)
-#define GAIN_TO_EIGHTH 16384 /* Q15 times Q15 to the upper word, as an eighth */
+#define GAIN_TO_EIGHTH (1 << 14) /* Q15 times Q15 to the upper word, as an eighth */
 /* Six times the smallest r of a shorted switch, per v_dc. */
 #define ALL_KNOWN Q15(6.0 / 8.0)
 #define QUARTER_OF_TWO_KNOWN Q15(6.0 * 25.0 / 48.0 / 4.0)
@@ -102,11 +102,11 @@ shorted_switch_t shorted_switch_find(const shorted_switch_in_t *in)
     }
     const int32_t least = (phases.known == PHASES) ? fx_mul_q15(v_dc, ALL_KNOWN)
                                                    : 4 * fx_mul_q15(v_dc, QUARTER_OF_TWO_KNOWN);
-    if (phases.known < 2 || fx_abs_q31(six_r) <= least) {
+    if (phases.known < 2) {
         return SHORTED_SWITCH_NONE;
     }
-    if (six_r > 0) {
-        return (phases.i[x] > in->i_min) ? SHORTED_SWITCH_UPPER : SHORTED_SWITCH_NONE;
+    if (six_r > least && phases.i[x] > in->i_min) {
+        return SHORTED_SWITCH_UPPER;
     }
-    return (phases.i[x] < -in->i_min) ? SHORTED_SWITCH_LOWER : SHORTED_SWITCH_NONE;
+    return (six_r < -least && phases.i[x] < -in->i_min) ? SHORTED_SWITCH_LOWER : SHORTED_SWITCH_NONE;
 }

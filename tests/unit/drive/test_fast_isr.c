@@ -546,67 +546,156 @@ void test_a_gate_fault_waits_for_one_period_where_currents_flow(void)
     expect_shorted_by_the_upper_switches();
 }
 
-/* A period with switching disabled, whose currents flow out of the bridge in phase a and into it in b; the flux changes
- * in the direction of phase c alone, so that a and b have the same voltage, which a switch must have caused. last_q15:
- * the currents at the beginning of the period. */
-static void search_shorted(int32_t psi_c, uint32_t periods, int32_t last_q15, int32_t amperes_q15)
+/* A period with switching disabled: its two samples, q15. */
+typedef struct {
+    ab_q15_t i[2], psi[2];
+    dq_q15_t i_dq[2];
+    int32_t zero_q28[2];
+    uint32_t periods; /* since the fault, at the second sample; 0: there is no first one */
+    uint8_t waits;
+} searched_t;
+
+/* PSI_C: the third phase is 0.4 of the dc voltage away from the rail of the other two. */
+#define V_DC 22938
+#define PER_DC (V_DC * 0.3299) /* flux that the dc voltage makes in a period */
+#define PSI_C ((int32_t)(0.4 * PER_DC * 2.0 / 3.0))
+
+/* The current flows out of the bridge in phase a and into it in b; the flux changes in the direction of phase c alone,
+ * so that a and b have the same voltage, which a switch must have caused. At the beginning the flux is not zero. */
+static searched_t period_of(int32_t psi_c, int32_t i)
+{
+    const ab_q15_t current = {i, -(int32_t)(i / 1.7320508)};
+    const dq_q15_t dq = {(q15_t)current.alpha, (q15_t)current.beta};
+    return (searched_t){
+        .i = {current, current},
+        .i_dq = {dq, dq},
+        .psi = {{3000, -2000}, {3000 - psi_c / 2, -2000 - (int32_t)(psi_c * SQRT3_HALF)}},
+        .periods = 1,
+        .waits = 5,
+    };
+}
+
+static void search_in(const searched_t *given)
 {
     seam_start();
-    drive.fast.short_circuit.waits = 5;
+    drive.fast.short_circuit.waits = given->waits;
     drive.fast.faults = FAULT_GATE;
+    drive.fast.fault_period = 71U - given->periods;
     for (uint32_t k = 0; k < 2U; k++) {
-        const int32_t alpha = (k == 0U) ? last_q15 : amperes_q15, beta = -(int32_t)(alpha / 1.7320508);
-        sample_t sample = {.i_ab = fx_pair(alpha, beta), .point.i = {alpha, beta}, .v_dc = 22938};
-        sample.point.flux.psi_d = (k == 0U) ? 0 : -psi_c / 2;
-        sample.point.flux.psi_q = (k == 0U) ? 0 : (int32_t)(-psi_c * SQRT3_HALF);
+        const sample_t sample = {
+            .i_ab = fx_pair(given->i[k].alpha, given->i[k].beta),
+            .point = {.i = given->i_dq[k], .flux = {.psi_d = given->psi[k].alpha, .psi_q = given->psi[k].beta}},
+            .zero_q28 = given->zero_q28[k],
+            .v_dc = V_DC};
         drive.samples.generation = 69U + k;
-        drive.fast.fault_period = 71U - periods;
-        if (k == 1U || periods != 0U) {
+        if (k == 1U || given->periods != 0U) {
             (void)short_circuit_may_begin(&drive, &sample, fx_pair(32767, 0));
         }
         drive.samples.slot[(70U + k) % SAMPLE_SLOTS] = sample;
     }
 }
 
-static void expect_search(int32_t psi_c, uint32_t periods, short_circuit_side_t side, unsigned waits)
+static void expect_found(const searched_t *given, bool found, unsigned waits)
 {
-    search_shorted(psi_c, periods, 4000, 4000);
-    TEST_ASSERT_EQUAL(side, drive.fast.short_circuit.side);
+    search_in(given);
+    TEST_ASSERT_EQUAL(found ? SHORT_CIRCUIT_UPPER : SHORT_CIRCUIT_LOWER, drive.fast.short_circuit.side);
+    TEST_ASSERT_EQUAL_UINT8(found ? 2 : 0, drive.fast.short_circuit.changes); /* 2: kept from then on */
     TEST_ASSERT_EQUAL_UINT(waits, drive.fast.short_circuit.waits);
 }
 
-/* psi_c: the third phase is 0.4 of the dc voltage away from the rail of the other two. */
 void test_the_currents_of_a_gate_fault_show_the_side_of_a_shorted_switch(void)
 {
-    const int32_t psi_c = (int32_t)(0.4 * 22938 * 0.3299 * 2.0 / 3.0);
-    expect_search(-psi_c, 1, SHORT_CIRCUIT_UPPER, 0);
-    TEST_ASSERT_EQUAL_UINT8(2, drive.fast.short_circuit.changes); /* kept from then on */
-    expect_search(psi_c, 1, SHORT_CIRCUIT_LOWER, 0);
-    expect_search(-psi_c, 0, SHORT_CIRCUIT_LOWER, 4); /* the period of the fault */
-    expect_search(0, 1, SHORT_CIRCUIT_LOWER, 0);      /* nothing to be seen, but a current flows */
-    TEST_ASSERT_EQUAL_UINT8(0, drive.fast.short_circuit.changes);
+    searched_t given = period_of(-PSI_C, 4000);
+    expect_found(&given, true, 0);
+    given.periods = 0; /* the period of the fault */
+    expect_found(&given, false, 4);
+    given = period_of(0, 4000); /* nothing to be seen, but a current flows */
+    expect_found(&given, false, 0);
+    given = period_of(PSI_C, 4000);
+    search_in(&given);
+    TEST_ASSERT_EQUAL(SHORT_CIRCUIT_LOWER, drive.fast.short_circuit.side);
+    TEST_ASSERT_EQUAL_UINT8(2, drive.fast.short_circuit.changes);
 }
 
+/* b has turned around late in the period, and its diodes explain the voltages. Without the first sample they would
+ * show an upper switch. */
+void test_a_current_that_turns_around_within_the_period_of_the_search_is_known_to(void)
+{
+    searched_t given = period_of(0, 0);
+    given.i[0] = (ab_q15_t){8000, 1270};
+    given.i[1] = (ab_q15_t){8000, 6466};
+    given.psi[1].alpha += (int32_t)(-0.5333 * PER_DC);
+    given.psi[1].beta += (int32_t)(-0.2309 * PER_DC);
+    given.i_dq[1] = (dq_q15_t){8000, 6466};
+    expect_found(&given, false, 0);
+    given.i[0] = given.i[1];
+    expect_found(&given, true, 0);
+}
+
+/* 5 % of the largest are 1024. */
 void test_the_search_for_a_shorted_switch_ends_after_two_periods_without_current(void)
 {
-    for (uint32_t periods = 0; periods < 3; periods++) {
-        search_shorted(-2000, periods, 0, 0);
-        TEST_ASSERT_EQUAL_UINT(periods < 2U ? 4U - periods : 0U, drive.fast.short_circuit.waits);
-        TEST_ASSERT_EQUAL_UINT8(0, drive.fast.short_circuit.changes);
+    for (uint32_t periods = 0; periods < 3U; periods++) {
+        searched_t given = period_of(-PSI_C, 0);
+        given.periods = periods;
+        expect_found(&given, false, periods < 2U ? 4U - periods : 0U);
+    }
+    static const struct {
+        dq_q15_t i;
+        unsigned waits;
+    } cases[] = {{{1024, 0}, 3}, {{1025, 0}, 0}, {{0, -1024}, 3}, {{0, -1025}, 0}, {{800, 800}, 0}};
+    for (unsigned k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        searched_t given = period_of(-PSI_C, 0);
+        given.i_dq[1] = cases[k].i;
+        expect_found(&given, false, cases[k].waits);
     }
 }
 
-/* The tables end at the largest current. */
-void test_currents_beyond_the_tables_show_no_shorted_switch(void)
+/* i_dead is 410: half of it has no direction. What shows a switch ends the wait, however small it is. */
+void test_a_small_current_shows_a_shorted_switch_too(void)
 {
-    static const int32_t beyond[2][2] = {{4000, 24000}, {24000, 4000}};
-    for (int k = 0; k < 2; k++) {
-        search_shorted(-2000, 1, beyond[k][0], beyond[k][1]);
-        TEST_ASSERT_EQUAL(SHORT_CIRCUIT_LOWER, drive.fast.short_circuit.side);
-        TEST_ASSERT_EQUAL_UINT(0, drive.fast.short_circuit.waits);
+    searched_t given = period_of(-PSI_C, 200);
+    expect_found(&given, false, 3);
+    given = period_of(-PSI_C, 212);
+    expect_found(&given, true, 0);
+}
+
+/* The tables end at the largest current, 20480, and are of no use if the currents do not add up. */
+void test_currents_without_a_known_flux_show_no_shorted_switch(void)
+{
+    static const dq_q15_t beyond[] = {{20481, 0}, {0, 20481}, {16000, 16000}};
+    searched_t given = period_of(-PSI_C, 4000);
+    given.i_dq[0] = given.i_dq[1] = (dq_q15_t){20480, 0};
+    expect_found(&given, true, 0);
+    for (int end = 0; end < 2; end++) {
+        for (int k = 0; k < 3; k++) {
+            given = period_of(-PSI_C, 4000);
+            given.i_dq[end] = beyond[k];
+            expect_found(&given, false, 0);
+        }
+        given = period_of(-PSI_C, 4000);
+        given.zero_q28[end] = -546 * 8192; /* a third of the largest sum */
+        expect_found(&given, true, 0);
+        given.zero_q28[end] -= 8192;
+        expect_found(&given, false, 0);
     }
-    search_shorted(-2000, 1, 16000, 16000);
-    TEST_ASSERT_EQUAL(SHORT_CIRCUIT_UPPER, drive.fast.short_circuit.side);
+}
+
+void test_only_while_the_short_circuit_waits_is_a_shorted_switch_searched(void)
+{
+    searched_t given = period_of(-PSI_C, 4000);
+    given.waits = 0;
+    expect_found(&given, false, 0);
+    given.waits = 2;
+    expect_found(&given, true, 0);
+}
+
+/* The first flux of a search is never that of an earlier one. */
+void test_while_the_bridge_runs_the_flux_of_an_earlier_search_is_discarded(void)
+{
+    drive.fast.short_circuit.open_switch.has_begun = true;
+    short_circuit_prepare(&drive.fast, 5);
+    TEST_ASSERT_FALSE(drive.fast.short_circuit.open_switch.has_begun);
 }
 
 /* Switching is disabled, the machine turns slowly, and 100 A still flow in the next steps of the task. */
