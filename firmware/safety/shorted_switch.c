@@ -9,7 +9,7 @@
 #define PHASES 3
 /* Voltages are 2 pi/8 times per unit, r six times that. */
 #define EIGHTH_OF_TURN Q15(0.78539816339744831)
-#define GAIN_TO_EIGHTH (1 << 14) /* Q15 times Q15 to the upper word, as an eighth */
+#define GAIN_TO_EIGHTH Q15(0.5) /* Q15 times Q15 to the upper word, as an eighth */
 /* Six times the smallest r of a shorted switch, per v_dc. */
 #define ALL_KNOWN Q15(6.0 / 8.0)
 #define QUARTER_OF_TWO_KNOWN Q15(6.0 * 25.0 / 48.0 / 4.0)
