@@ -85,7 +85,7 @@ typedef struct {
     short_circuit_side_t side;
     bool holds;                      /* the short circuit is on, as read back */
     uint8_t changes;                 /* of the side, because a switch does not switch on, since the bridge last ran */
-    uint8_t waits;                   /* periods with switching disabled that come before it, (SS-21) */
+    uint8_t waits;                   /* periods with switching disabled that come before it, (SS-21), (SS-30) */
     bool searches_flux;              /* the flux is searched in every second period */
     bool ignores_voltage;            /* the latched over-voltage is a jump of the sensor, which shorts nothing */
     open_switch_state_t open_switch; /* while it waits after a gate fault, psi_0 is the flux a period ago */

@@ -115,7 +115,7 @@ void short_circuit_step(drive_t *drive, const sample_t *sample, bool upper, int3
     short_circuit_apply(&drive->fast, upper, found);
 }
 
-/* Nothing that the diodes or a shorted switch carry, beyond the measuring error. */
+/* What is measured may be the sensors' error alone. */
 static bool is_without_current(const drive_t *drive, const sample_t *sample)
 {
     const int32_t i_alive = drive->motor->gate_fault.i_alive;
@@ -123,7 +123,7 @@ static bool is_without_current(const drive_t *drive, const sample_t *sample)
     return i.d * i.d + i.q * i.q <= i_alive * i_alive;
 }
 
-/* Of the last period, in which switching was disabled throughout. */
+/* Judges the last period, in which switching was disabled throughout. */
 static shorted_switch_t find_shorted(const drive_t *drive, const sample_t *sample, ab_q15_t psi)
 {
     const sample_t *last = sample_box_at(&drive->samples, drive->samples.generation);
@@ -135,7 +135,7 @@ static shorted_switch_t find_shorted(const drive_t *drive, const sample_t *sampl
         .psi = fx_pair(psi.alpha, psi.beta),
         .v_dc = sample->v_dc,
         .turn_gain = drive->motor->launch_power.turn_gain,
-        .i_min = (q15_t)(drive->motor->plausibility.i_dead / 2),
+        .i_min = (q15_t)(drive->motor->plausibility.i_dead >> 1),
     };
     return shorted_switch_find(&in);
 }
@@ -197,7 +197,9 @@ bool short_circuit_waits(fast_state_t *fast)
         fast->short_circuit.waits = 0;
         return false;
     }
-    fast->short_circuit.waits--;
+    if ((faults & FAULT_GATE) == 0U) { /* else the search ends the wait, (SS-30) */
+        fast->short_circuit.waits--;
+    }
     return true;
 }
 

@@ -8,7 +8,7 @@
  *   Over-temperature and over-speed leave current control intact, but latching the fault ends it. Before the fault is
  *     latched, i* moves in 8 steps to the steady current of the short circuit, psi_d(i_d, 0) + dpsi = 0 and i_q = 0,
  *     and stays there for 2 steps.
- *   Every other fault brings the short circuit at once.
+ *   Every other fault is latched at once.
  * Source   docs/theory/safe-state.md (SS-8), (SS-12)
  * Units    per unit of motor.bases
  * Range    i_d down to the demagnetisation limit at the present temperature

@@ -24,9 +24,14 @@ typedef struct {
     int known; /* number of phases with a direction */
 } phases_t;
 
+static inline FX_INLINED_IF_OPTIMISED int32_t size_of(int32_t x)
+{
+    return (x < 0) ? -x : x;
+}
+
 static inline FX_INLINED_IF_OPTIMISED void add_phase(phases_t *phases, int x, int32_t last, int32_t now, int32_t i_min)
 {
-    const int32_t size = fx_abs_q31(now), size_last = fx_abs_q31(last);
+    const int32_t size = size_of(now), size_last = size_of(last);
     phases->i[x] = now;
     phases->turned[x] = false;
     phases->g[x] = 0;
@@ -37,7 +42,7 @@ static inline FX_INLINED_IF_OPTIMISED void add_phase(phases_t *phases, int x, in
     if (size_last <= i_min || (last ^ now) >= 0) {
         phases->g[x] = (now > 0) ? ONE_Q15 : -ONE_Q15;
     } else {
-        phases->g[x] = fx_div_q15(last + now, size_last + size);
+        phases->g[x] = fx_div_q15((last + now) >> 1, (size_last + size) >> 1);
         phases->turned[x] = true;
         phases->any_turned = true;
     }
@@ -61,20 +66,17 @@ static inline FX_INLINED_IF_OPTIMISED void find_phases(phases_t *phases, const s
 }
 
 /* The phase whose r has the largest magnitude, and six times that r. */
-static FX_NOT_INLINED int largest_of(const phases_t *phases, int32_t v_dc, int32_t *six_r)
+static inline FX_INLINED_IF_OPTIMISED int largest_of(const phases_t *phases, int32_t v_dc, int32_t *six_r)
 {
     const int32_t sum = phases->g[0] + phases->g[1] + phases->g[2];
-    int largest = 0;
-    int32_t size = -1;
+    int32_t r[PHASES];
     FX_UNROLLED
     for (int x = 0; x < PHASES; x++) {
-        const int32_t r = phases->six_u[x] + ((v_dc * ((3 * phases->g[x] - sum) >> 3)) >> 12);
-        if (fx_abs_q31(r) > size) {
-            size = fx_abs_q31(r);
-            *six_r = r;
-            largest = x;
-        }
+        r[x] = phases->six_u[x] + ((v_dc * ((3 * phases->g[x] - sum) >> 3)) >> 12);
     }
+    int largest = (size_of(r[1]) > size_of(r[0])) ? 1 : 0;
+    largest = (size_of(r[2]) > size_of(r[largest])) ? 2 : largest;
+    *six_r = r[largest];
     return largest;
 }
 
@@ -93,7 +95,7 @@ shorted_switch_t shorted_switch_find(const shorted_switch_in_t *in)
 {
     const q15_t v_dc = fx_mul_q15((q15_t)in->v_dc, EIGHTH_OF_TURN);
     phases_t phases;
-    int32_t six_r;
+    int32_t six_r = 0;
     find_phases(&phases, in);
     int x = largest_of(&phases, v_dc, &six_r);
     if (phases.any_turned && !phases.turned[x]) {

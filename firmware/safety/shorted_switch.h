@@ -11,12 +11,12 @@
  *   direction.
  *   Found if i_x flows through that switch and the largest |r_x| exceeds 25/48 v_dc, where two phases have a direction,
  *   or v_dc/8, where all three have one.
- *   g_x = 0 if |i_x| <= i_min at the end; the sign of i_x there if |i_x| <= i_min at the beginning. Of a current that
- *   has turned around it is that of a straight line if this phase has the largest |r|, else 0.
+ *   g_x = 0 if |i_x| <= i_min at the end; the sign of i_x there if |i_x| <= i_min at the beginning. Of currents that
+ *   have turned around it is that of a straight line if the largest |r| is that of one of them, else 0.
  * Source   docs/theory/safe-state.md (SS-28), (SS-29)
  * Units    per unit
  * Range    every argument in q15; i_min > 0, v_dc >= 0, turn_gain from 0 to 2^28
- * Rounding 2^-11 of V_b in r
+ * Rounding in r: 1 LSB of the flux times turn_gain/(2 pi), 2^-11 of V_b at the largest turn_gain of the motors here
  * Errors   none: a change of the flux by more than 1 saturates
  * Context  fast ISR, after a gate fault; one division for each current that has turned around */
 #include <stdint.h>

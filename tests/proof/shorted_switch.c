@@ -9,7 +9,7 @@
 /* Any share that two currents of opposite signs can have. */
 q15_t fx_div_q15(int32_t num, int32_t den)
 {
-    PROVE(den > 0 && num > -32769 && num < 32769);
+    PROVE(IS_Q15(num) && IS_Q15(den) && den > 0);
     q15_t share;
     ASSUME(IS_Q15(share));
     return share;

@@ -145,6 +145,7 @@ COUNTS = {
     "SETTLING_PERIODS": "periods of the excitation, whose filter follows the PWM frequency",
     "LAST_BUT_ONE": "steps of an update, whose rates are generated for its true time",
     "ATTEMPTS": "of a save",
+    "SEARCH_PERIODS": "PWM periods in which the currents of a gate fault can show a switch that conducts always",
     "PREDICTION_STEP": "the place of a step among those of an update, whose rates are generated for its true time",
     "SLOTS": "milliseconds of the clock that the frames are sent by",
 }  # fmt: skip

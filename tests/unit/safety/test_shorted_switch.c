@@ -111,8 +111,8 @@ void test_a_current_that_turns_around_is_carried_by_both_diodes(void)
     }
 }
 
-/* The lower switch of c is shorted, and the current of b dies against the upper rail: for the tenth of the period that
- * this takes, and not for as long as a straight line from -25 to 2 would say. */
+/* The lower switch of c is shorted, and the current of b dies against the upper rail within a quarter of the period or
+ * less: a straight line from -1250 to 250 would say five sixths. */
 void test_a_current_that_turns_around_in_another_phase_is_not_taken_for_a_straight_line(void)
 {
     const int last[3] = {7000, -1250, -5750}, now[3] = {6350, 250, -6600};

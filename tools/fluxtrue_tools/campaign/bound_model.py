@@ -35,7 +35,7 @@ class Physics:
     dead_V: float  # nominal loss of a leg to dead time
     r_ohm: float  # at the reported temperature
     kept: dict[tuple[tuple[int, ...], bytes], tuple[Array, Array, Array]] = field(
-        default_factory=dict, repr=False, compare=False
+        init=False, default_factory=dict, repr=False, compare=False
     )
 
     def split(self, x: Array) -> dict[str, float]:

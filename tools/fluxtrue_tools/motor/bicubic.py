@@ -81,7 +81,7 @@ class Bicubic:
         """The derivative of these orders, up to 2, at points within the knots."""
         if x.size < MANY:
             return np.asarray(self.spline.ev(x, y, dx=nx, dy=ny))
-        axes = (self.place.axis(0, self.knots_x, x.ravel()), self.place.axis(1, self.knots_y, y.ravel()))
+        axes = (self.place.axis(0, self.knots_x, x.flatten()), self.place.axis(1, self.knots_y, y.flatten()))
         parts = zip(*(axis.levels for axis in axes), strict=True)
         table = self._of(nx, ny)
         return np.concatenate([_sum(table, *part, nx, ny) for part in parts]).reshape(x.shape)
