@@ -123,7 +123,7 @@ static bool is_without_current(const drive_t *drive, const sample_t *sample)
     return i.d * i.d + i.q * i.q <= i_alive * i_alive;
 }
 
-/* Judges the last period, in which switching was disabled throughout. */
+/* Evaluates the last period, in which switching was disabled throughout. */
 static shorted_switch_t find_shorted(const drive_t *drive, const sample_t *sample, ab_q15_t psi)
 {
     const sample_t *last = sample_box_at(&drive->samples, drive->samples.generation);

@@ -3,7 +3,8 @@
 #define SAFETY_GATE_FAULT_H
 /** The safe state that a gate-driver fault needs. Its usual cause is a shorted switch: with switching disabled,
  * half-wave currents then brake a turning machine at any speed.
- *   e > v_dc/8: short circuit, after the search for a shorted switch (SS-30); e < v_dc/16: switching disabled; between: as before
+ *   e > v_dc/8: short circuit, after the search for a shorted switch (SS-30); e < v_dc/16: switching disabled;
+ *   between: as before
  *   A current above i_alive + 2 |i_0| although switching is disabled, while the sum of (v_dc - e) T over the steps
  *   exceeds 1.5 sqrt(3) psi_b: the dc link ends any current of the windings sooner, so a switch is shorted.
  *   That is a gate fault, too, and needs the short circuit until the faults are reset. i_0, the mean of the measured
