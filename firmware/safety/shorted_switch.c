@@ -65,15 +65,17 @@ static inline FX_INLINED_IF_OPTIMISED void find_phases(phases_t *phases, const s
     add_phase(phases, 2, in->i_last.c, in->i.c, in->i_min);
 }
 
+static inline FX_INLINED_IF_OPTIMISED int32_t six_r_of(const phases_t *phases, int x, int32_t sum, int32_t v_dc)
+{
+    return phases->six_u[x] + ((v_dc * ((3 * phases->g[x] - sum) >> 3)) >> 12);
+}
+
 /* The phase whose r has the largest magnitude, and six times that r. */
 static inline FX_INLINED_IF_OPTIMISED int largest_of(const phases_t *phases, int32_t v_dc, int32_t *six_r)
 {
     const int32_t sum = phases->g[0] + phases->g[1] + phases->g[2];
-    int32_t r[PHASES];
-    FX_UNROLLED
-    for (int x = 0; x < PHASES; x++) {
-        r[x] = phases->six_u[x] + ((v_dc * ((3 * phases->g[x] - sum) >> 3)) >> 12);
-    }
+    const int32_t r[PHASES] = {six_r_of(phases, 0, sum, v_dc), six_r_of(phases, 1, sum, v_dc),
+                               six_r_of(phases, 2, sum, v_dc)};
     int largest = (size_of(r[1]) > size_of(r[0])) ? 1 : 0;
     largest = (size_of(r[2]) > size_of(r[largest])) ? 2 : largest;
     *six_r = r[largest];

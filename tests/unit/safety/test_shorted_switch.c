@@ -258,3 +258,16 @@ void test_without_a_dc_voltage_nothing_is_found(void)
         TEST_ASSERT_EQUAL(SHORTED_SWITCH_NONE, shorted_switch_find(&in));
     }
 }
+
+/* Without a dc voltage r is the voltage alone: 2000 and -2000, exactly. */
+void test_of_two_phases_with_the_same_magnitude_the_first_one_counts(void)
+{
+    const shorted_switch_in_t in = {
+        .i_last = {MOST, -MOST, 0},
+        .i = {MOST, -MOST, 0},
+        .psi = fx_pair(2000, -1155),
+        .turn_gain = 1 << 20,
+        .i_min = I_MIN,
+    };
+    TEST_ASSERT_EQUAL(SHORTED_SWITCH_UPPER, shorted_switch_find(&in));
+}
