@@ -168,13 +168,20 @@ def a_shorted_switch_ends_in_the_short_circuit_on_its_side(parts: Parts) -> None
             assert abs(loop.get("truth.torque_Nm")) < 10.0, "the short circuit is symmetrical"
 
 
-def a_short_circuit_that_the_drivers_end_is_made_on_the_other_side(parts: Parts) -> None:
-    """The defect moves from a lower switch to an upper one while the lower ones are on: the drivers end that."""
+@contextmanager
+def shorted_below(parts: Parts) -> Iterator[tuple[Loop, Core]]:
+    """The short circuit by the lower switches, because one of them is shorted."""
     with driving(parts) as (loop, core):
         loop.set("plant.switch_shorted_lower_b", 1)
         loop.run(2000)
         assert core.outputs == ALL_OUTPUTS
         assert core.duty(0) == 0.0
+        yield loop, core
+
+
+def a_short_circuit_that_the_drivers_end_is_made_on_the_other_side(parts: Parts) -> None:
+    """The defect moves from a lower switch to an upper one while the lower ones are on: the drivers end that."""
+    with shorted_below(parts) as (loop, core):
         loop.set("plant.switch_shorted_lower_b", 0)
         loop.set("plant.switch_shorted_upper_a", 1)
         loop.run(10)
@@ -184,11 +191,7 @@ def a_short_circuit_that_the_drivers_end_is_made_on_the_other_side(parts: Parts)
 
 def the_gates_are_read_back_at_their_pins(parts: Parts) -> None:
     """A lower output that no longer reaches its pin ends the short circuit on this side, although the timer runs."""
-    with driving(parts) as (loop, core):
-        loop.set("plant.switch_shorted_lower_b", 1)
-        loop.run(2000)
-        assert core.outputs == ALL_OUTPUTS
-        assert core.duty(0) == 0.0
+    with shorted_below(parts) as (loop, core):
         core.set_register("PORTD.PCR16", GPIO)
         loop.run(10)
         assert core.outputs == NO_OUTPUTS or core.duty(0) == 1.0
