@@ -2,6 +2,7 @@
 #include "scope/capture.h"
 
 #include "fx/codegen.h"
+#include "hal/gather.h"
 #include "scope/columns.h"
 #include "scope/trigger.h"
 
@@ -24,7 +25,11 @@ bool capture_config_is_valid(const capture_config_t *config)
 static FX_NOT_INLINED FX_COLD void begin(capture_t *capture, const capture_config_t *config, capture_state_t state)
 {
     const uint16_t number = (uint16_t)(capture->number + 1U);
-    *capture = (capture_t){.config = *config, .state = (uint8_t)state, .number = number, .values = capture->values};
+    *capture = (capture_t){.config = *config,
+                           .state = (uint8_t)state,
+                           .number = number,
+                           .values = capture->values,
+                           .coming = capture->coming};
     columns_find(capture);
 }
 
@@ -76,35 +81,50 @@ static FX_NOT_INLINED FX_COLD void begin_after(capture_t *capture)
 }
 
 /* Samples that lie side by side in the ring and in the memory. */
-static uint32_t contiguous(const capture_t *capture, uint32_t newest)
+static FX_NOT_INLINED void begin_run(capture_t *capture)
 {
-    const uint32_t divisor = capture->config.divisor;
     const uint32_t slots = SAMPLE_SLOTS - 1U - capture->next % SAMPLE_SLOTS;
-    return lesser(lesser(newest - capture->next, slots) / divisor + 1U,
-                  (uint32_t)capture->config.samples - capture->at);
+    capture->at = (uint16_t)((capture->at == capture->config.samples) ? 0U : capture->at);
+    capture->run =
+        (uint16_t)lesser(slots / capture->config.divisor + 1U, (uint32_t)capture->config.samples - capture->at);
+    columns_move(capture);
 }
 
 static void take(capture_t *capture, int16_t *memory, const sample_t *next, uint32_t count)
 {
     const capture_config_t *config = &capture->config;
-    const uint32_t at = capture->at;
-    columns_copy(capture, &memory[(size_t)at * config->signals], next, count);
+    columns_copy(capture, memory, next, count);
     capture->next += count * config->divisor;
-    capture->at = (uint16_t)((at + count == config->samples) ? 0U : at + count);
+    capture->at = (uint16_t)(capture->at + count);
+    capture->run = (uint16_t)(capture->run - count);
+}
+
+/* A tool may read the memory as soon as the state says so. */
+static FX_NOT_INLINED FX_COLD void finish(capture_t *capture)
+{
+    columns_end(capture);
+    capture->parts = GATHER_CLOSED;
+    if (!hal_gather_wait()) {
+        capture->lost++;
+    }
+    capture->state = CAPTURE_DONE;
 }
 
 static void count_triggered(capture_t *capture, uint32_t count)
 {
     capture->remaining = (uint16_t)(capture->remaining - count);
     if (capture->remaining == 0U) {
-        capture->state = CAPTURE_DONE;
+        finish(capture);
     }
 }
 
 static FX_NOT_INLINED void record(capture_t *capture, int16_t *memory, const sample_t *slot, uint32_t newest)
 {
     const bool armed = capture->state == CAPTURE_ARMED;
-    const uint32_t readable = contiguous(capture, newest);
+    if (capture->run == 0U) {
+        begin_run(capture);
+    }
+    const uint32_t readable = lesser((newest - capture->next) / capture->config.divisor + 1U, capture->run);
     const sample_t *next = &slot[capture->next % SAMPLE_SLOTS];
     const uint32_t count = armed ? trigger_search(capture, next, readable) : lesser(readable, capture->remaining);
     if (count > 0U) { /* else the trigger is the next sample */
@@ -125,14 +145,16 @@ static FX_NOT_INLINED FX_COLD void skip_lost_periods(capture_t *capture, uint32_
         capture->filled = 0;
         trigger_reset(capture);
         capture->next = newest;
+        capture->run = 0;
     } else {
         capture->taken = (uint16_t)(capture->taken - capture->remaining);
-        capture->state = CAPTURE_DONE;
+        finish(capture);
     }
 }
 
 void capture_step(capture_t *capture, int16_t *memory, const sample_t *slot, uint32_t newest)
 {
+    columns_begin(capture);
     while ((int32_t)(newest - capture->next) >= 0 &&
            (capture->state == CAPTURE_ARMED || capture->state == CAPTURE_TRIGGERED)) {
         if (newest - capture->next >= USABLE) {
@@ -141,4 +163,5 @@ void capture_step(capture_t *capture, int16_t *memory, const sample_t *slot, uin
             record(capture, memory, slot, newest);
         }
     }
+    columns_end(capture);
 }

@@ -43,6 +43,16 @@ typedef enum {
     TRIGGERS = 6
 } capture_trigger_t;
 
+#define GATHER_CLOSED 0xFFU
+
+/** How far the port's hardware that copies (hal/gather.h) is prepared. */
+typedef enum {
+    GATHER_NEVER = 0,      /* the memory is so small that one step may write a row twice: the order counts */
+    GATHER_NOT_SET_UP = 1, /* for this capture */
+    GATHER_SET_UP = 2,
+    GATHER_CONTINUES = 3 /* where the next sample lies */
+} capture_gather_t;
+
 typedef struct {
     uint8_t signals;                     /* 1 ... 8 */
     uint8_t signal[CAPTURE_SIGNALS_MAX]; /* capture_signal_t */
@@ -65,19 +75,20 @@ typedef struct {
     uint16_t lost;
     uint32_t trigger_period; /* number of the PWM period of the trigger, since the start */
     /* Not read by tools. */
-    scope_step_values_t values;         /* of the command before the last: those of the periods copied next */
-    uint32_t next;                      /* period of the next sample */
-    uint32_t asked_for;                 /* period in which a command or a fault triggers */
-    int32_t trigger_offset;             /* the trigger is reached where sign * value + offset >= 0 */
-    uint16_t at;                        /* row of the next sample */
-    uint16_t filled;                    /* samples since the arming, at most `samples` */
-    uint16_t remaining;                 /* samples until the end */
-    uint8_t place[CAPTURE_SIGNALS_MAX]; /* of the signals in a slot, or in the values of the step */
-    uint8_t of_step;                    /* bits of the signals that are values of the step */
-    uint8_t trigger_place;              /* of the trigger's signal: of the step from sizeof(sample_t) on */
-    int8_t trigger_sign;                /* 1, or -1: triggers downwards */
-    bool uses_step;                     /* one of the signals, or the trigger's, is a value of the step */
-    bool usual;                         /* SCOPE_USUAL_SIGNALS, in this order and no others */
+    scope_step_values_t values; /* of the command before the last: those of the periods that are being copied */
+    scope_step_values_t coming; /* of the last command: those of the periods copied next */
+    uint32_t next;              /* period of the next sample */
+    uint32_t asked_for;         /* period in which a command or a fault triggers */
+    int32_t trigger_offset;     /* the trigger is reached where sign * value + offset >= 0 */
+    uint16_t at;                /* row of the next sample; `samples`: the first */
+    uint16_t run;               /* samples from it on that lie side by side in the ring and in the memory; 0: unknown */
+    uint16_t filled;            /* samples since the arming, at most `samples` */
+    uint16_t remaining;         /* samples until the end */
+    uint8_t trigger_place;      /* of the trigger's signal: of the step from sizeof(sample_t) on */
+    int8_t trigger_sign;        /* 1, or -1: triggers downwards */
+    bool uses_step;             /* one of the signals, or the trigger's, is a value of the step */
+    uint8_t gather;             /* capture_gather_t */
+    uint8_t parts;              /* that the hardware has taken in this step; GATHER_CLOSED: it takes none */
     bool asked;
     bool plain; /* armed, and only a level in the samples of every period is waited for */
     bool ready; /* reaching the level triggers: before an edge, the signal has been on the other side of it */

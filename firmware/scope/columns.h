@@ -10,6 +10,7 @@
 #include <stddef.h>
 
 #include "fx/codegen.h"
+#include "hal/gather.h"
 #include "scope/capture_state.h"
 
 /** A signal from the capture's next period on. */
@@ -30,12 +31,32 @@ static inline uint32_t lesser(uint32_t a, uint32_t b)
     return (a < b) ? a : b;
 }
 
-/** The places of the signals: once, when a capture begins. */
+/** What is the same during a whole capture: once, when it begins. */
 void columns_find(capture_t *capture);
 /** The trigger's signal. */
 column_t column_of_trigger(const capture_t *capture, const sample_t *next);
-/** Copies `count` samples, at least one, of all captured signals, from the next period on. The samples must be
- * contiguous in the ring. */
-void columns_copy(const capture_t *capture, int16_t *to, const sample_t *next, uint32_t count);
+/** Before the first copy of a step: whether the port's hardware (hal/gather.h) is idle. */
+static inline void columns_begin(capture_t *capture)
+{
+    const bool open = capture->gather != GATHER_NEVER && hal_gather_is_idle();
+    capture->parts = open ? 0U : GATHER_CLOSED;
+}
+/** Copies `count` samples, at least one, of all captured signals, from the next period on. The samples must be contiguous
+ * in the ring and in the memory. */
+void columns_copy(capture_t *capture, int16_t *memory, const sample_t *next, uint32_t count);
+/** After the last copy of a step: the hardware, if there is any, copies while the task continues. */
+static inline void columns_end(capture_t *capture)
+{
+    if (capture->parts - 1U < HAL_GATHER_PARTS) {
+        hal_gather_start();
+    }
+}
+/** The next sample does not follow the last one, in the ring or in the memory. */
+static inline void columns_move(capture_t *capture)
+{
+    if (capture->gather == GATHER_CONTINUES) {
+        capture->gather = GATHER_SET_UP;
+    }
+}
 
 #endif

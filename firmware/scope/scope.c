@@ -75,7 +75,7 @@ static scope_result_t arm(scope_t *scope, const drive_t *drive)
         return SCOPE_OUT_OF_RANGE;
     }
     capture_arm(&scope->capture, &scope->setup, drive->samples.generation);
-    scope->capture.values = step_values(drive);
+    scope->capture.coming = step_values(drive);
     return SCOPE_OK;
 }
 
@@ -154,8 +154,9 @@ FX_NOT_INLINED void scope_record(scope_t *scope, const drive_t *drive, bool faul
     if (fault != scope->fault) {
         follow_fault(scope, fault, (drive->fast.faults != 0U) ? drive->fast.fault_period : newest, newest);
     }
-    capture_step(&scope->capture, scope->memory, drive->samples.slot, newest);
     if (scope->capture.uses_step) {
-        scope->capture.values = step_values(drive);
+        scope->capture.values = scope->capture.coming;
+        scope->capture.coming = step_values(drive);
     }
+    capture_step(&scope->capture, scope->memory, drive->samples.slot, newest);
 }

@@ -172,6 +172,43 @@ _Static_assert(offsetof(lmem_t, PCCRMR) == 0x20, "PCCRMR");
 #define LMEM_PCCRMR_R2(x) (((uint32_t)(x) << 26) & 0xc000000U)
 
 typedef struct {
+    uint8_t reserved0[0x1000];
+    volatile uint32_t TCD0_SADDR;
+    volatile uint16_t TCD0_SOFF;
+    volatile uint16_t TCD0_ATTR;
+    volatile uint32_t TCD0_NBYTES_MLNO;
+    volatile uint32_t TCD0_SLAST;
+    volatile uint32_t TCD0_DADDR;
+    volatile uint16_t TCD0_DOFF;
+    volatile uint16_t TCD0_CITER_ELINKNO;
+    volatile uint32_t TCD0_DLASTSGA;
+    volatile uint16_t TCD0_CSR;
+    volatile uint16_t TCD0_BITER_ELINKNO;
+    volatile uint32_t TCD1_SADDR;
+} dma_t;
+_Static_assert(offsetof(dma_t, TCD0_SADDR) == 0x1000, "TCD0_SADDR");
+_Static_assert(offsetof(dma_t, TCD0_SOFF) == 0x1004, "TCD0_SOFF");
+_Static_assert(offsetof(dma_t, TCD0_ATTR) == 0x1006, "TCD0_ATTR");
+_Static_assert(offsetof(dma_t, TCD0_NBYTES_MLNO) == 0x1008, "TCD0_NBYTES_MLNO");
+_Static_assert(offsetof(dma_t, TCD0_SLAST) == 0x100c, "TCD0_SLAST");
+_Static_assert(offsetof(dma_t, TCD0_DADDR) == 0x1010, "TCD0_DADDR");
+_Static_assert(offsetof(dma_t, TCD0_DOFF) == 0x1014, "TCD0_DOFF");
+_Static_assert(offsetof(dma_t, TCD0_CITER_ELINKNO) == 0x1016, "TCD0_CITER_ELINKNO");
+_Static_assert(offsetof(dma_t, TCD0_DLASTSGA) == 0x1018, "TCD0_DLASTSGA");
+_Static_assert(offsetof(dma_t, TCD0_CSR) == 0x101c, "TCD0_CSR");
+_Static_assert(offsetof(dma_t, TCD0_BITER_ELINKNO) == 0x101e, "TCD0_BITER_ELINKNO");
+_Static_assert(offsetof(dma_t, TCD1_SADDR) == 0x1020, "TCD1_SADDR");
+#define DMA_TCD0_ATTR_DSIZE_MASK 0x7U
+#define DMA_TCD0_ATTR_DSIZE(x) (((uint32_t)(x) << 0) & 0x7U)
+#define DMA_TCD0_ATTR_SSIZE_MASK 0x700U
+#define DMA_TCD0_ATTR_SSIZE(x) (((uint32_t)(x) << 8) & 0x700U)
+#define DMA_TCD0_CSR_START 0x1U
+#define DMA_TCD0_CSR_MAJORELINK 0x20U
+#define DMA_TCD0_CSR_DONE 0x80U
+#define DMA_TCD0_CSR_MAJORLINKCH_MASK 0xf00U
+#define DMA_TCD0_CSR_MAJORLINKCH(x) (((uint32_t)(x) << 8) & 0xf00U)
+
+typedef struct {
     uint8_t reserved0[0x404];
     volatile uint32_t OCMDR1;
 } mscm_t;
@@ -501,7 +538,7 @@ typedef struct {
     volatile uint32_t MIER;
     uint8_t reserved1[0xc];
     volatile uint32_t TVAL0;
-    volatile uint32_t CVAL0;
+    const volatile uint32_t CVAL0;
     volatile uint32_t TCTRL0;
 } lpit_t;
 _Static_assert(offsetof(lpit_t, MCR) == 0x8, "MCR");
@@ -635,6 +672,8 @@ extern rcm_t fake_RCM;
 #define RCM (&fake_RCM)
 extern lmem_t fake_LMEM;
 #define LMEM (&fake_LMEM)
+extern dma_t fake_DMA;
+#define DMA (&fake_DMA)
 extern mscm_t fake_MSCM;
 #define MSCM (&fake_MSCM)
 extern ftfc_t fake_FTFC;
@@ -684,6 +723,7 @@ extern can_t fake_CAN0;
 #define SIM ((sim_t *)0x40048000U)
 #define RCM ((rcm_t *)0x4007f000U)
 #define LMEM ((lmem_t *)0xe0082000U)
+#define DMA ((dma_t *)0x40008000U)
 #define MSCM ((mscm_t *)0x40001000U)
 #define FTFC ((ftfc_t *)0x40020000U)
 #define WDOG ((wdog_t *)0x40052000U)

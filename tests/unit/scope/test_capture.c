@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The capture beside a record of every period that was ever written: each sample is compared with that record. */
+/* The capture beside a record of every period that was ever written: each sample is compared with that record. The
+ * file is compiled twice: for a port without hardware that copies (GATHER 0), and for one with it. */
 #include "scope/capture.h"
 
 #include <string.h>
 
+#include "late_gather.h"
 #include "unity.h"
 
 #define PERIODS 4000
@@ -49,6 +51,7 @@ static void run(uint32_t periods)
 static void step(void)
 {
     capture_step(&capture, memory, ring, offset + newest);
+    late_gather_end(); /* the hardware has copied nothing before */
 }
 
 static void run_steps(uint32_t steps)
@@ -106,6 +109,7 @@ static uint32_t triggered_in(capture_trigger_t trigger, int16_t level)
 void setUp(void)
 {
     memset(&capture, 0, sizeof capture);
+    late_gather_reset(GATHER);
     newest = offset = 0;
     capture.values = (scope_step_values_t){.i_d_ref = 1, .i_q_ref = 2, .torque_commanded = 3, .psi_error = 4};
     config = (capture_config_t){
@@ -410,14 +414,12 @@ static void expect_usual_periods(void)
     }
 }
 
-/* They are copied by words: each of them is in its place, whatever number of rows a step copies. */
 void test_the_usual_signals_in_steps_of_every_length(void)
 {
     for (uint32_t length = 1; length <= 60; length++) {
         setUp();
         choose_the_usual();
         arm_for(TRIGGER_RISING, 0);
-        TEST_ASSERT_TRUE(capture.usual);
         while (capture.state != CAPTURE_DONE) {
             run(length);
             step();
@@ -427,25 +429,93 @@ void test_the_usual_signals_in_steps_of_every_length(void)
     }
 }
 
-/* Another order, fewer signals and a divisor are not the usual case. */
-void test_signals_that_are_not_the_usual(void)
+void test_the_usual_signals_with_a_divisor(void)
 {
     choose_the_usual();
     config.divisor = 3;
     arm_for(TRIGGER_MANUAL, 0);
-    TEST_ASSERT_FALSE(capture.usual);
     run_steps(30);
     capture_trigger(&capture, newest + 1U);
     run_steps(30);
     expect_usual_periods();
-    config.divisor = 1;
-    config.signals = CAPTURE_SIGNALS_MAX - 1U;
-    arm();
-    TEST_ASSERT_FALSE(capture.usual);
-    config.signals = CAPTURE_SIGNALS_MAX;
-    config.signal[7] = CAPTURE_i_alpha_A;
-    arm();
-    TEST_ASSERT_FALSE(capture.usual);
+}
+
+/* The ring begins again in each 64 periods, the memory in each 100: the hardware is told only there. */
+void test_the_hardware_continues_until_ring_or_memory_begin_again(void)
+{
+    late_gather_reset(true);
+    arm_for(TRIGGER_MANUAL, 0);
+    run_steps(64);
+    TEST_ASSERT_EQUAL_UINT32(64, late_gather.copies);
+    TEST_ASSERT_EQUAL_UINT32(1, late_gather.set_ups);
+    TEST_ASSERT_EQUAL_UINT32(1 + 10 + 6, late_gather.moves);
+}
+
+/* Where ring and memory begin again in the same step, it has a third part. */
+void test_the_processor_copies_what_the_hardware_has_no_room_for(void)
+{
+    late_gather_reset(true);
+    config.samples = 70;
+    arm_for(TRIGGER_MANUAL, 0);
+    for (uint32_t k = 0; k < 60U; k++) {
+        run(40);
+        step();
+    }
+    TEST_ASSERT_EQUAL_UINT32(60, late_gather.copies);
+    TEST_ASSERT_TRUE(late_gather.parts < 60U * 40U / 64U + 60U * 40U / 70U + 60U);
+    capture_trigger(&capture, newest + 1);
+    run_steps(6);
+    expect_periods();
+}
+
+/* One step may write such a memory twice: the hardware, which comes later, would overwrite what the processor wrote. */
+void test_a_small_memory_is_filled_by_the_processor(void)
+{
+    late_gather_reset(true);
+    config.samples = 5;
+    config.before = 4;
+    arm_for(TRIGGER_MANUAL, 0);
+    run_steps(64);
+    TEST_ASSERT_EQUAL_UINT32(0, late_gather.copies);
+    capture_trigger(&capture, newest + 1);
+    run_steps(2);
+    expect_periods();
+}
+
+/* The capture is complete without it, and the copy that did not end is counted. */
+void test_hardware_that_does_not_end_is_not_used_again(void)
+{
+    late_gather_reset(true);
+    config.before = 0;
+    arm_for(TRIGGER_MANUAL, 0);
+    run_steps(3);
+    late_gather.stuck = true;
+    run_steps(1);
+    TEST_ASSERT_EQUAL_UINT32(4, late_gather.copies);
+    capture_trigger(&capture, newest + 1);
+    run_steps(20);
+    TEST_ASSERT_EQUAL_UINT32(4, late_gather.copies);
+    TEST_ASSERT_EQUAL_UINT16(1, capture.lost);
+    expect_periods();
+}
+
+/* A tool that finds the state done reads samples that are there. */
+void test_the_last_copy_has_ended_when_the_capture_is_done(void)
+{
+    late_gather_reset(true);
+    config.before = 0;
+    config.samples = SAMPLE_SLOTS;
+    arm_for(TRIGGER_ABOVE, -2500);
+    while (capture.state != CAPTURE_DONE) {
+        run(STEP);
+        capture_step(&capture, memory, ring, offset + newest);
+        if (capture.state != CAPTURE_DONE) {
+            late_gather_end();
+        }
+    }
+    TEST_ASSERT_TRUE(late_gather.copies >= 2U);
+    TEST_ASSERT_TRUE(hal_gather_is_idle());
+    expect_periods();
 }
 
 /* Several samples are searched at once when enough lie before and nothing but a level is waited for. */

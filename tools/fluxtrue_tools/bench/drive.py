@@ -18,6 +18,7 @@ from typing import Protocol
 import numpy as np
 
 from fluxtrue_tools.bench.build import FIRMWARE, ROOT, build_host, build_target
+from fluxtrue_tools.bench.gather import Gather
 from fluxtrue_tools.bench.machine import Machine
 from fluxtrue_tools.motor.build import build as build_motor
 from fluxtrue_tools.motor.flux_model import FluxModel
@@ -89,7 +90,8 @@ def build_task(folder: Path) -> Path:
     stages = Path(__file__).with_name("task_kernels.c")
     ecu = [FIRMWARE / "ecu" / f"{name}.c" for name in ("arbitration", "supervisor", "supervisor_table")]
     ecu += sorted(path for layer in ("second_level", "scope") for path in (FIRMWARE / layer).glob("*.c"))
-    return build_target(folder / "task.elf", [*sources(folder), stages, *ecu], (*LTO, f"-I{ROOT}"), [stages])
+    port = ROOT / "hal" / "s32k144" / "gather.c"
+    return build_target(folder / "task.elf", [*sources(folder), stages, port, *ecu], (*LTO, f"-I{ROOT}"), [stages])
 
 
 def build_drive_host(folder: Path, flags: tuple[str, ...] = ()) -> Path:
@@ -248,6 +250,8 @@ TASK_TITLES = {
     "second_level_frame": "second level, a frame",
     "scope_idle": "scope, nothing armed",
     "scope_armed": "scope, armed: eight values of ten periods, and the search",
+    "scope_mixed": "scope, armed: two of the period and six of the task, and the search",
+    "scope_seldom": "scope, armed: eight values of each tenth period, and the search",
     "scope_triggered": "scope, triggered: eight values of ten periods",
 }
 PAPERS = ("schedule",)
@@ -257,12 +261,14 @@ def measure_task(path: Path) -> list[Stage]:
     """The stages of the 1 kHz task, each on a copy of the drive just before the task runs."""
     target = Target(path)
     machine = target.machine
+    gather = Gather(machine.uc)
     overhead = machine.count("task_nothing")[1]
     seen: dict[str, list[int]] = {name: [] for name in TASK_TITLES}
 
     def task(names: Iterable[str], warm: list[int]) -> None:
         for name in names:
             machine.call("task_copy")
+            gather.end_step()
             issued = machine.count(f"task_{name}")[1] - overhead
             if warm:
                 seen[name].append(issued)

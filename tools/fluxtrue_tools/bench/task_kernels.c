@@ -2,6 +2,8 @@
 /* The stages of the 1 kHz task as functions of their own, and the supervisor's of the bus. Each works on a copy of the
  * drive as the task is about to find it, with the inputs that the task gives it; it leaves nothing behind. Compiled as
  * the task is: small, but for what is in fast_sources.txt, which is called, not compiled in. */
+#include <string.h>
+
 #include "drive/drive.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/slow_monitors.h"
@@ -37,6 +39,8 @@ void task_second_level(void);
 void task_second_level_frame(void);
 void task_scope_idle(void);
 void task_scope_armed(void);
+void task_scope_mixed(void);
+void task_scope_seldom(void);
 void task_scope_triggered(void);
 
 static drive_t copy;
@@ -45,7 +49,7 @@ static volatile int32_t result;
 static supervisor_t supervisor = {.state = STATE_RUN, .enabled = true, .enable_seen = true};
 static arbitrate_state_t arbitration;
 static second_level_t second_level;
-static scope_t idle_scope, armed_scope, triggered_scope;
+static scope_t idle_scope, armed_scope, mixed_scope, seldom_scope, triggered_scope;
 
 /* The drive by its address, as the task has it. */
 static drive_t *the_copy(void)
@@ -55,14 +59,20 @@ static drive_t *the_copy(void)
     return address;
 }
 
-/* Eight values of every period: one scope waits for a level that never comes, the other one has been triggered and is
- * armed again when it is complete, before the step that is counted. */
+/* Waits for a level that never comes. */
+static void arm(scope_t *scope, const capture_config_t *config, uint32_t newest)
+{
+    if (scope->capture.state == CAPTURE_IDLE) {
+        capture_arm(&scope->capture, config, newest);
+    }
+}
+
+/* One scope has been triggered and is armed again when it is complete, before the step that is counted. */
 static void prepare_scopes(void)
 {
-    const capture_config_t config = {
+    capture_config_t config = {
         .signals = CAPTURE_SIGNALS_MAX,
-        .signal = {CAPTURE_i_d_A, CAPTURE_i_q_A, CAPTURE_u_d_V, CAPTURE_u_q_V, CAPTURE_v_dc_V, CAPTURE_omega_rad_s,
-                   CAPTURE_theta_e_deg, CAPTURE_i_zero_A},
+        .signal = SCOPE_USUAL_SIGNALS,
         .trigger = TRIGGER_ABOVE,
         .trigger_signal = CAPTURE_v_dc_V,
         .divisor = 1,
@@ -70,12 +80,18 @@ static void prepare_scopes(void)
         .level = INT16_MAX,
     };
     const uint32_t before = copy.samples.generation - PERIODS_OF_A_STEP;
-    if (armed_scope.capture.state == CAPTURE_IDLE) {
-        capture_arm(&armed_scope.capture, &config, before);
-    }
+    arm(&armed_scope, &config, before);
     if (triggered_scope.capture.state != CAPTURE_TRIGGERED) {
         capture_freeze(&triggered_scope.capture, &config, before + 1U, before);
     }
+    config.divisor = PERIODS_OF_A_STEP;
+    arm(&seldom_scope, &config, before);
+    const uint8_t mixed[CAPTURE_SIGNALS_MAX] = {
+        CAPTURE_i_d_A,     CAPTURE_i_d_ref_A,         CAPTURE_i_q_ref_A,         CAPTURE_torque_commanded_Nm,
+        CAPTURE_omega_rad_s, CAPTURE_torque_corrected_Nm, CAPTURE_torque_estimated_Nm, CAPTURE_psi_error_Vs};
+    config.divisor = 1;
+    memcpy(config.signal, mixed, sizeof mixed);
+    arm(&mixed_scope, &config, before);
 }
 
 CALLED void task_copy(void)
@@ -290,6 +306,16 @@ CALLED void task_scope_idle(void)
 CALLED void task_scope_armed(void)
 {
     scope_step(&armed_scope, the_copy(), false);
+}
+
+CALLED void task_scope_mixed(void)
+{
+    scope_step(&mixed_scope, the_copy(), false);
+}
+
+CALLED void task_scope_seldom(void)
+{
+    scope_step(&seldom_scope, the_copy(), false);
 }
 
 CALLED void task_scope_triggered(void)

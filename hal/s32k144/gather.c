@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The scope's copies by the DMA. Each of two banks of channels copies a part: channel k of a bank copies column k and
+ * then starts the next one; the first is started by software. While a bank continues from part to part, the other one
+ * waits for columns that are moved. The channels need no request from a peripheral, and no interrupt. S32K1xx reference
+ * manual, enhanced direct memory access. */
+#include "hal/gather.h"
+
+#include <stddef.h>
+
+#include "fx/codegen.h"
+#include "hal/s32k144/registers.h"
+
+#define VALUE_SIZE 2U
+#define OTHER_BANK (HAL_GATHER_COLUMNS * (uint32_t)sizeof(channel_t))
+#define LINK ((uint32_t)DMA_TCD0_CSR_MAJORELINK | DMA_TCD0_CSR_MAJORLINKCH_MASK)
+#define HALF_WORDS (DMA_TCD0_ATTR_SSIZE(1) | DMA_TCD0_ATTR_DSIZE(1))
+/* Reads of the last channel's status, each at least 8 cycles: 64 values of 8 columns end within it even if each takes
+ * 64 cycles. */
+#define POLLS 4096U
+
+/* The registers of one channel. */
+typedef struct {
+    volatile uint32_t SADDR;
+    volatile uint16_t SOFF, ATTR;
+    volatile uint32_t NBYTES;
+    volatile uint32_t SLAST, DADDR;
+    volatile uint16_t DOFF, CITER;
+    volatile uint32_t DLASTSGA;
+    volatile uint16_t CSR, BITER;
+} channel_t;
+
+#define OFFSET(of_channel, of_dma) \
+    _Static_assert(offsetof(channel_t, of_channel) == offsetof(dma_t, of_dma) - offsetof(dma_t, TCD0_SADDR), #of_dma)
+OFFSET(SOFF, TCD0_SOFF);
+OFFSET(ATTR, TCD0_ATTR);
+OFFSET(NBYTES, TCD0_NBYTES_MLNO);
+OFFSET(SLAST, TCD0_SLAST);
+OFFSET(DADDR, TCD0_DADDR);
+OFFSET(DOFF, TCD0_DOFF);
+OFFSET(CITER, TCD0_CITER_ELINKNO);
+OFFSET(DLASTSGA, TCD0_DLASTSGA);
+OFFSET(CSR, TCD0_CSR);
+OFFSET(BITER, TCD0_BITER_ELINKNO);
+_Static_assert(sizeof(channel_t) == offsetof(dma_t, TCD1_SADDR) - offsetof(dma_t, TCD0_SADDR), "channels");
+
+/* Of channels: distances in bytes from the first. */
+static struct {
+    uint16_t last;  /* of a bank: from its first channel */
+    uint16_t bank;  /* of the part that was added last */
+    uint16_t first; /* of the first part */
+    bool moved;     /* the columns, to the other bank */
+    bool started;   /* since the set-up */
+} state;
+
+static inline channel_t *channel_at(uint32_t distance)
+{
+    return (channel_t *)(void *)((uint8_t *)DMA + offsetof(dma_t, TCD0_SADDR) + distance);
+}
+
+static inline uint32_t link_to(uint32_t distance)
+{
+    return DMA_TCD0_CSR_MAJORELINK | DMA_TCD0_CSR_MAJORLINKCH(distance / sizeof(channel_t));
+}
+
+/* The first store clears DONE: while that is set, a link is not accepted. */
+static void set_status(channel_t *channel, uint32_t status)
+{
+    channel->CSR = 0;
+    channel->CSR = (uint16_t)status;
+}
+
+bool hal_gather_is_idle(void)
+{
+    return !state.started || (channel_at((uint32_t)state.bank + state.last)->CSR & DMA_TCD0_CSR_DONE) != 0U;
+}
+
+static void set_up_channel(uint32_t distance, uint32_t stride, uint32_t row_size)
+{
+    channel_t *channel = channel_at(distance);
+    set_status(channel, link_to(distance + (uint32_t)sizeof(channel_t)));
+    channel->SOFF = (uint16_t)stride;
+    channel->ATTR = HALF_WORDS;
+    channel->SLAST = 0;
+    channel->DOFF = (uint16_t)row_size;
+    channel->CITER = 1;
+    channel->DLASTSGA = 0;
+    channel->BITER = 1;
+}
+
+void hal_gather_set_up(uint32_t columns, const uint32_t *stride, uint32_t row_size)
+{
+    state.last = (uint16_t)((columns - 1U) * sizeof(channel_t));
+    state.started = false;
+    for (uint32_t k = 0; k < columns; k++) {
+        set_up_channel(k * sizeof(channel_t), stride[k], row_size);
+        set_up_channel(OTHER_BANK + k * sizeof(channel_t), stride[k], row_size);
+    }
+}
+
+void hal_gather_move(uint32_t column, const void *from, int16_t *to)
+{
+    channel_t *channel = channel_at((state.bank ^ OTHER_BANK) + column * sizeof(channel_t));
+    channel->SADDR = (uint32_t)(uintptr_t)from;
+    channel->DADDR = (uint32_t)(uintptr_t)to;
+    state.moved = true;
+}
+
+/* Also the channels that are not used get their number of bytes: that is shorter than counting them. */
+void hal_gather_add(uint32_t count, bool is_further)
+{
+    const uint32_t before = state.bank;
+    if (state.moved) {
+        state.bank = (uint16_t)(before ^ OTHER_BANK);
+        state.moved = false;
+    }
+    channel_t *channel = channel_at(state.bank);
+    FX_ADDRESS_ONCE(channel);
+    FX_UNROLLED
+    for (uint32_t k = 0; k < HAL_GATHER_COLUMNS; k++) {
+        channel[k].NBYTES = count * VALUE_SIZE;
+    }
+    channel_at((uint32_t)state.bank + state.last)->CSR = 0; /* neither DONE nor a link */
+    if (is_further) {
+        channel_at(before + state.last)->CSR = (uint16_t)link_to(state.bank);
+    } else {
+        state.first = state.bank;
+    }
+}
+
+void hal_gather_start(void)
+{
+    channel_t *first = channel_at(state.first);
+    state.started = true;
+    set_status(first, (first->CSR & LINK) | DMA_TCD0_CSR_START);
+}
+
+bool hal_gather_wait(void)
+{
+    uint32_t polls = POLLS;
+    while (!hal_gather_is_idle() && polls > 0U) {
+        polls--;
+    }
+    return hal_gather_is_idle();
+}
