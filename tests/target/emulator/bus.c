@@ -45,6 +45,7 @@ const peripheral_t peripherals[] = {
     ROW(LMEM,   lmem,   0,     0, false),
     ROW(FTFC,   ftfc,   0x80,  0, false),
     ROW(MSCM,   mscm,   0,     0, false),
+    ROW(DMA,    dma,    0,     0, false),
 };
 /* clang-format on */
 const int peripherals_count = (int)(sizeof peripherals / sizeof peripherals[0]);
@@ -59,26 +60,41 @@ static const facts_t *facts_named(const char *name)
     return NULL;
 }
 
+/* Addresses that belong to the peripheral: whole pages, up to its last register. */
+static uint32_t span_of(const facts_t *of)
+{
+    return ((uint32_t)of->fact[of->count - 1].offset / PAGE + 1U) * PAGE;
+}
+
+/* On the peripheral bus; of several in one page the first counts. */
+static void pages_take(emu_t *emu, int p)
+{
+    const facts_t *of = emu->facts_of[p];
+    for (uint32_t at = 0; (of->base >> 28) == 4U && at < span_of(of); at += PAGE) {
+        const uint32_t page = ((of->base + at) / PAGE) & 0xFFU;
+        if (emu->page[page] < 0) {
+            emu->page[page] = (int16_t)p;
+        }
+    }
+}
+
 bool bus_create(emu_t *emu)
 {
     memset(emu->page, 0xFF, sizeof emu->page);
     for (int p = 0; p < peripherals_count; p++) {
         const facts_t *of = facts_named(peripherals[p].name);
-        int16_t *index = malloc(PAGE * sizeof *index);
+        int16_t *index = of != NULL ? malloc(span_of(of) * sizeof *index) : NULL;
         if (of == NULL || index == NULL || of->count > REGISTERS_MAX) {
             free(index);
             return false;
         }
-        memset(index, 0xFF, PAGE * sizeof *index);
+        memset(index, 0xFF, span_of(of) * sizeof *index);
         for (int r = of->count - 1; r >= 0; r--) {
             index[of->fact[r].offset] = (int16_t)r; /* of several at one offset the first, the widest, counts */
         }
         emu->facts_of[p] = of;
         emu->index_of[p] = index;
-        const uint32_t page = (of->base / PAGE) & 0xFFU;
-        if ((of->base >> 28) == 4U && emu->page[page] < 0) {
-            emu->page[page] = (int16_t)p;
-        }
+        pages_take(emu, p);
     }
     return true;
 }
@@ -130,9 +146,10 @@ static bool find(emu_t *emu, int p, uint32_t address, uint32_t size, const char 
 {
     const peripheral_t *peripheral = &peripherals[p];
     const uint32_t offset = address - emu->facts_of[p]->base;
-    int16_t r = offset < PAGE ? emu->index_of[p][offset] : -1;
+    const uint32_t span = span_of(emu->facts_of[p]);
+    int16_t r = offset < span ? emu->index_of[p][offset] : -1;
     place->shift = 0;
-    if (r < 0 && offset < PAGE) {
+    if (r < 0 && offset < span) {
         r = emu->index_of[p][offset & ~3U];
         place->shift = 8U * (offset & 3U);
     }

@@ -76,7 +76,8 @@ static void stretch(uint64_t *instant, uint64_t now, uint32_t before, uint32_t a
 /* What counts the core's clock keeps its count. */
 void emu_core_clock(emu_t *emu, uint32_t ticks_per_cycle)
 {
-    static const timer_t_ counted[] = {TIMER_FTM0, TIMER_FTM2, TIMER_PDB0, TIMER_PDB1, TIMER_FAULT, TIMER_SYSTICK};
+    static const timer_t_ counted[] = {TIMER_FTM0,  TIMER_FTM2,    TIMER_PDB0, TIMER_PDB1,
+                                       TIMER_FAULT, TIMER_SYSTICK, TIMER_DMA};
     state_t *s = &emu->s;
     const uint32_t before = s->core_ticks;
     s->core_ticks = ticks_per_cycle;
@@ -132,6 +133,8 @@ static void timer_fire(emu_t *emu)
         can_fire(emu);
     } else if (i == TIMER_FTFC) {
         ftfc_fire(emu);
+    } else if (i == TIMER_DMA) {
+        dma_fire(emu);
     } else {
         systick_fire(emu);
     }

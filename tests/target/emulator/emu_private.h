@@ -34,6 +34,7 @@ enum {
     DATA_FLASH_PHRASE = 8,
     DATA_FLASH_BASE = 0x10000000,
     DATA_FLASH_PCCRMR = 0x20, /* of LMEM: caching by region */
+    DMA_CHANNELS = 16,
 };
 #define NEVER UINT64_MAX
 
@@ -53,6 +54,7 @@ typedef enum {
     TIMER_CAN,
     TIMER_SYSTICK,
     TIMER_FTFC,
+    TIMER_DMA,
     TIMERS
 } timer_t_;
 
@@ -166,6 +168,11 @@ typedef struct {
 } ftfc_t;
 
 typedef struct {
+    uint16_t written[DMA_CHANNELS]; /* fields of each descriptor since the reset; one bit per half word */
+    uint8_t active;                 /* channel + 1, 0: none */
+} dma_t;
+
+typedef struct {
     uint64_t now, limit, due[TIMERS];
     uint64_t event; /* when the event that is being handled was due, NEVER: there is none */
     uint64_t instructions, break_at;
@@ -182,6 +189,7 @@ typedef struct {
     windings_t windings;
     wdog_t wdog;
     ftfc_t ftfc;
+    dma_t dma;
     uint64_t lpit_ready;                  /* from then on the registers of LPIT0 may be written */
     uint32_t core_ticks;                  /* per core cycle */
     uint64_t oscillator_ready, pll_ready; /* from then on they are valid */
@@ -322,6 +330,7 @@ enum {
     PERIPHERAL_LMEM,
     PERIPHERAL_FTFC,
     PERIPHERAL_MSCM,
+    PERIPHERAL_DMA,
 };
 #define PERIPHERAL(name) (&peripherals[PERIPHERAL_##name])
 extern const peripheral_t peripherals[];
@@ -377,6 +386,7 @@ void ftfc_reset(emu_t *emu);
 void ftfc_abort(emu_t *emu);
 bool ftfc_is_busy(const emu_t *emu);
 void ftfc_double_bit_fault(emu_t *emu);
+void dma_fire(emu_t *emu);
 
 /* data_flash.c */
 void data_flash_create(emu_t *emu);
@@ -439,5 +449,6 @@ MODEL(trgmux);
 MODEL(lmem);
 MODEL(ftfc);
 MODEL(mscm);
+MODEL(dma);
 
 #endif

@@ -18,13 +18,17 @@ from pathlib import Path
 from fluxtrue_tools.outputs import write_text
 
 PERIPHERALS = (
-    "MSCM", "FTFC", "DMAMUX", "CAN0", "FTM0", "FTM2", "ADC0", "ADC1", "LPSPI0", "LPSPI1", "LPSPI2", "PDB0", "PDB1",
+    "MSCM", "FTFC", "DMA", "DMAMUX", "CAN0", "FTM0", "FTM2", "ADC0", "ADC1", "LPSPI0", "LPSPI1", "LPSPI2", "PDB0", "PDB1",
     "LPIT0", "SIM", "PORTA", "PORTB", "PORTC", "PORTD", "PORTE", "WDOG", "TRGMUX", "SCG", "PCC", "PMC", "SMC", "RCM",
     "PTA", "PTB", "PTC", "PTD", "PTE", "MCM", "LMEM",
 )  # fmt: skip
 
 # Masks that differ from the SVD's fields: the watchdog's counter register also takes 32-bit commands.
 ANY_VALUE = {("WDOG", "CNT")}
+
+# The bits of some registers have several meanings, of which a control bit chooses one. Those that are not modelled: of
+# the DMA controller, offsets of a minor loop and links at its end.
+OTHER_MEANINGS = {"DMA": ("_MLOFFNO", "_MLOFFYES", "_ELINKYES")}
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,8 @@ def registers(peripheral: ElementTree.Element) -> Iterator[Register]:
         if (peripheral.findtext("name"), node.findtext("name")) in ANY_VALUE:
             writable = fields = 0xFFFFFFFF
         name, offset = node.findtext("name", ""), _number(node, "addressOffset")
+        if name.endswith(OTHER_MEANINGS.get(peripheral.findtext("name", ""), ())):
+            continue
         for k in range(int(node.findtext("dim", "1"), 0)):
             yield Register(
                 name.replace("%s", str(k)),
