@@ -4,20 +4,20 @@
 #define LIMIT(x) (((x) > 32767) ? 32767 : ((x) < -32767) ? -32767 : (x))
 #define KEEP(name, base, text) frame->name[frame->oldest] = (int16_t)LIMIT(now->name);
 
-void freeze_frame_step(freeze_frame_t *frame, const measurements_t *now, uint16_t ecu_faults, uint8_t state,
+bool freeze_frame_step(freeze_frame_t *frame, const measurements_t *now, uint16_t ecu_faults, uint8_t state,
                        uint32_t passed_ms)
 {
     const bool fault = now->fault_word != 0U || ecu_faults != 0U;
     frame->now_ms += passed_ms;
     if (frame->frozen != 0U) {
         frame->frozen = fault ? 1U : 0U;
-        return;
+        return !fault;
     }
     FREEZE_FRAME_LIST(KEEP)
     frame->oldest = (uint8_t)((frame->oldest + 1U) % FREEZE_FRAME_SAMPLES);
     if (!fault) {
         frame->state = state;
-        return;
+        return false;
     }
     frame->frozen = 1U;
     frame->time_ms = frame->now_ms;
@@ -26,4 +26,5 @@ void freeze_frame_step(freeze_frame_t *frame, const measurements_t *now, uint16_
     frame->ecu_faults = ecu_faults;
     frame->psi_f_Vs = now->psi_f_Vs;
     frame->r_ohm = now->r_ohm;
+    return true;
 }

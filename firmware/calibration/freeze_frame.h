@@ -41,8 +41,8 @@ typedef struct {
     FREEZE_FRAME_LIST(FREEZE_FRAME_SIGNAL)
 } freeze_frame_t;
 
-/** passed_ms: since the last step. */
-void freeze_frame_step(freeze_frame_t *frame, const measurements_t *now, uint16_t ecu_faults, uint8_t state,
+/** passed_ms: since the last step. True: a fault has come, or all have gone, since the last step. */
+bool freeze_frame_step(freeze_frame_t *frame, const measurements_t *now, uint16_t ecu_faults, uint8_t state,
                        uint32_t passed_ms);
 
 #endif

@@ -235,14 +235,16 @@ void ecu_task_1khz(ecu_t *ecu)
     ecu_pass(ecu, FLOW_ARBITRATED);
     ecu_check_dc_sensor(ecu);
     task_1khz(&ecu->drive);
-    scope_step(&ecu->scope, &ecu->drive, ecu->supervisor.faults != 0U);
     check_by_second_level(ecu, &raw);
     ecu_pass(ecu, FLOW_CHECKED);
     service_watchdog(ecu);
     answer(ecu);
     xcp_access_step(&ecu->xcp, &ecu->drive, ecu->clock.passed_ms);
-    freeze_frame_step(&ecu->freeze, &ecu->xcp.measurements, ecu->supervisor.faults, (uint8_t)ecu->supervisor.state,
-                      ecu->clock.passed_ms);
+    if (freeze_frame_step(&ecu->freeze, &ecu->xcp.measurements, ecu->supervisor.faults, (uint8_t)ecu->supervisor.state,
+                          ecu->clock.passed_ms)) {
+        scope_fault(&ecu->scope, &ecu->drive, ecu->freeze.frozen != 0U);
+    }
+    scope_step(&ecu->scope, &ecu->drive);
     send_frames(ecu);
     send_xcp(ecu);
     ecu_seal_flags(ecu);

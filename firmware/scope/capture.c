@@ -29,7 +29,8 @@ static FX_NOT_INLINED FX_COLD void begin(capture_t *capture, const capture_confi
                            .state = (uint8_t)state,
                            .number = number,
                            .values = capture->values,
-                           .coming = capture->coming};
+                           .coming = capture->coming,
+                           .recording = true};
     columns_find(capture);
 }
 
@@ -58,7 +59,7 @@ void capture_trigger(capture_t *capture, uint32_t period)
 {
     if (capture->state == CAPTURE_ARMED) {
         capture->asked = true;
-        capture->plain = false;
+        capture->search = SEARCH_ANY;
         capture->asked_for = period;
     }
 }
@@ -66,6 +67,7 @@ void capture_trigger(capture_t *capture, uint32_t period)
 void capture_stop(capture_t *capture)
 {
     capture->state = CAPTURE_IDLE;
+    capture->recording = false;
 }
 
 static FX_NOT_INLINED FX_COLD void begin_after(capture_t *capture)
@@ -85,8 +87,8 @@ static FX_NOT_INLINED void begin_run(capture_t *capture)
 {
     const uint32_t slots = SAMPLE_SLOTS - 1U - capture->next % SAMPLE_SLOTS;
     capture->at = (uint16_t)((capture->at == capture->config.samples) ? 0U : capture->at);
-    capture->run =
-        (uint16_t)lesser(slots / capture->config.divisor + 1U, (uint32_t)capture->config.samples - capture->at);
+    capture->run = (uint16_t)lesser(slots / capture->config.divisor + 1U,
+                                    (uint32_t)capture->config.samples - capture->at);
     columns_move(capture);
 }
 
@@ -108,6 +110,7 @@ static FX_NOT_INLINED FX_COLD void finish(capture_t *capture)
         capture->lost++;
     }
     capture->state = CAPTURE_DONE;
+    capture->recording = false;
 }
 
 static void count_triggered(capture_t *capture, uint32_t count)
@@ -155,8 +158,7 @@ static FX_NOT_INLINED FX_COLD void skip_lost_periods(capture_t *capture, uint32_
 void capture_step(capture_t *capture, int16_t *memory, const sample_t *slot, uint32_t newest)
 {
     columns_begin(capture);
-    while ((int32_t)(newest - capture->next) >= 0 &&
-           (capture->state == CAPTURE_ARMED || capture->state == CAPTURE_TRIGGERED)) {
+    while ((int32_t)(newest - capture->next) >= 0 && capture->recording) {
         if (newest - capture->next >= USABLE) {
             skip_lost_periods(capture, newest);
         } else {

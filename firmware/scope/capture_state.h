@@ -43,6 +43,13 @@ typedef enum {
     TRIGGERS = 6
 } capture_trigger_t;
 
+/** What an armed capture waits for in its next samples. */
+typedef enum {
+    SEARCH_ANY = 0,
+    SEARCH_PERIODS = 1, /* nothing but a level, in the samples of every period */
+    SEARCH_LEVEL = 2    /* the same with a divisor */
+} capture_search_t;
+
 #define GATHER_CLOSED 0xFFU
 
 /** How far the port's hardware that copies (hal/gather.h) is prepared. */
@@ -87,11 +94,12 @@ typedef struct {
     uint8_t trigger_place;      /* of the trigger's signal: of the step from sizeof(sample_t) on */
     int8_t trigger_sign;        /* 1, or -1: triggers downwards */
     bool uses_step;             /* one of the signals, or the trigger's, is a value of the step */
+    bool recording;             /* armed or triggered */
     uint8_t gather;             /* capture_gather_t */
     uint8_t parts;              /* that the hardware has taken in this step; GATHER_CLOSED: it takes none */
     bool asked;
-    bool plain; /* armed, and only a level in the samples of every period is waited for */
-    bool ready; /* reaching the level triggers: before an edge, the signal has been on the other side of it */
+    uint8_t search; /* capture_search_t */
+    bool ready;     /* reaching the level triggers: before an edge, the signal has been on the other side of it */
 } capture_t;
 
 #endif

@@ -18,12 +18,6 @@ _Static_assert(FROM_STEP + sizeof(scope_step_values_t) <= UINT8_MAX, "a place is
 _Static_assert(CAPTURE_SIGNALS_MAX <= HAL_GATHER_COLUMNS, "a column of the hardware for each signal");
 _Static_assert(SAMPLE_SLOTS * sizeof(sample_t) <= INT16_MAX, "several rows in the ring have such a distance");
 
-/* Bytes in the ring from one sample to the next. */
-static size_t stride_of(const capture_t *capture)
-{
-    return capture->config.divisor * sizeof(sample_t);
-}
-
 static column_t column_at(const capture_t *capture, uint8_t place, const sample_t *next)
 {
     if (place >= FROM_STEP) {
@@ -87,35 +81,44 @@ static FX_NOT_INLINED FX_COLD void set_up(const capture_t *capture)
     hal_gather_set_up(signals, stride, signals * (uint32_t)sizeof(int16_t));
 }
 
-static FX_NOT_INLINED void move(capture_t *capture, int16_t *memory, const sample_t *next)
+/* Also the columns that are not captured: their signals are valid, and a loop that counts would take longer. */
+static void move(const capture_t *capture, int16_t *first, const sample_t *next)
 {
+    FX_UNROLLED
+    for (uint32_t k = 0; k < CAPTURE_SIGNALS_MAX; k++) {
+        hal_gather_move(k, column(capture, k, next).from, &first[k]);
+    }
+}
+
+/* False: the processor must copy. */
+static FX_NOT_INLINED bool prepare(capture_t *capture, int16_t *memory, const sample_t *next)
+{
+    if (capture->gather == GATHER_NEVER) {
+        return false;
+    }
     if (capture->gather == GATHER_NOT_SET_UP) {
         set_up(capture);
     }
-    const uint32_t signals = capture->config.signals;
-    int16_t *first = row(capture, memory);
-    for (uint32_t k = 0; k < signals; k++) {
-        hal_gather_move(k, column(capture, k, next).from, &first[k]);
-    }
+    move(capture, row(capture, memory), next);
     capture->gather = GATHER_CONTINUES;
+    return true;
 }
 
 /* A part of the copy that the hardware will make; a second one has columns of its own. */
-static void gather(capture_t *capture, int16_t *memory, const sample_t *next, uint32_t count)
+static bool gather(capture_t *capture, int16_t *memory, const sample_t *next, uint32_t count)
 {
     const bool is_further = capture->parts != 0U;
-    if (capture->gather != GATHER_CONTINUES || is_further) {
-        move(capture, memory, next);
+    if ((capture->gather != GATHER_CONTINUES || is_further) && !prepare(capture, memory, next)) {
+        return false;
     }
     hal_gather_add(count, is_further);
     capture->parts++;
+    return true;
 }
 
 void columns_copy(capture_t *capture, int16_t *memory, const sample_t *next, uint32_t count)
 {
-    if (capture->parts < HAL_GATHER_PARTS) {
-        gather(capture, memory, next, count);
-    } else {
+    if (capture->parts >= HAL_GATHER_PARTS || !gather(capture, memory, next, count)) {
         copy(capture, memory, next, count);
         columns_move(capture);
     }

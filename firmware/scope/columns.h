@@ -31,6 +31,12 @@ static inline uint32_t lesser(uint32_t a, uint32_t b)
     return (a < b) ? a : b;
 }
 
+/** Bytes in the ring from one sample to the next. */
+static inline size_t stride_of(const capture_t *capture)
+{
+    return capture->config.divisor * sizeof(sample_t);
+}
+
 /** What is the same during a whole capture: once, when it begins. */
 void columns_find(capture_t *capture);
 /** The trigger's signal. */
@@ -38,8 +44,7 @@ column_t column_of_trigger(const capture_t *capture, const sample_t *next);
 /** Before the first copy of a step: whether the port's hardware (hal/gather.h) is idle. */
 static inline void columns_begin(capture_t *capture)
 {
-    const bool open = capture->gather != GATHER_NEVER && hal_gather_is_idle();
-    capture->parts = open ? 0U : GATHER_CLOSED;
+    capture->parts = hal_gather_is_idle() ? 0U : GATHER_CLOSED;
 }
 /** Copies `count` samples, at least one, of all captured signals, from the next period on. The samples must be contiguous
  * in the ring and in the memory. */

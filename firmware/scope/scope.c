@@ -135,28 +135,24 @@ static void end_fault(capture_t *capture)
     }
 }
 
-static FX_NOT_INLINED FX_COLD void follow_fault(scope_t *scope, bool fault, uint32_t period, uint32_t newest)
+FX_COLD void scope_fault(scope_t *scope, const drive_t *drive, bool fault)
 {
+    const uint32_t newest = drive->samples.generation; /* read once: a freeze frame may use the whole ring */
     if (fault) {
-        begin_fault(&scope->capture, period, newest);
+        begin_fault(&scope->capture, (drive->fast.faults != 0U) ? drive->fast.fault_period : newest, newest);
     } else {
         end_fault(&scope->capture);
     }
-    scope->fault = fault;
 }
 
 /* The periods copied here ran with the task's last command but one, whose values are kept for them. The command that
  * the task has just written acts from the next period on.
  * Not inlined: a step in which nothing is to be done then saves no registers. */
-FX_NOT_INLINED void scope_record(scope_t *scope, const drive_t *drive, bool fault)
+FX_NOT_INLINED void scope_record(scope_t *scope, const drive_t *drive)
 {
-    const uint32_t newest = drive->samples.generation; /* read once: a freeze frame may use the whole ring */
-    if (fault != scope->fault) {
-        follow_fault(scope, fault, (drive->fast.faults != 0U) ? drive->fast.fault_period : newest, newest);
-    }
     if (scope->capture.uses_step) {
         scope->capture.values = scope->capture.coming;
         scope->capture.coming = step_values(drive);
     }
-    capture_step(&scope->capture, scope->memory, drive->samples.slot, newest);
+    capture_step(&scope->capture, scope->memory, drive->samples.slot, drive->samples.generation);
 }

@@ -35,21 +35,21 @@ typedef enum { SCOPE_OK, SCOPE_UNKNOWN, SCOPE_TOO_SHORT, SCOPE_OUT_OF_RANGE, SCO
 typedef struct {
     capture_t capture;      /* first: what tools read begins here */
     capture_config_t setup; /* as the commands have left it; acts when it is armed */
-    bool fault;             /* in the last step */
     FX_WORD_ALIGNED int16_t memory[CAPTURE_MEMORY];
 } scope_t;
 
 /** command: without the protocol's own code. */
 scope_result_t scope_command(scope_t *scope, const drive_t *drive, const uint8_t *command, uint8_t length);
-/** A step of the scope while it records, or when a fault has occurred or has been reset. fault: of drive or ECU. */
-void scope_record(scope_t *scope, const drive_t *drive, bool fault);
+/** fault: one has come, to the drive or to the ECU, and there was none; else all have gone. */
+void scope_fault(scope_t *scope, const drive_t *drive, bool fault);
+/** A step of the scope while it records. */
+void scope_record(scope_t *scope, const drive_t *drive);
 
-/** Once per step. ecu_fault: outside of the drive. */
-static inline void scope_step(scope_t *scope, const drive_t *drive, bool ecu_fault)
+/** Once per step, after scope_fault(). */
+static inline void scope_step(scope_t *scope, const drive_t *drive)
 {
-    const bool fault = drive->fast.faults != 0U || ecu_fault;
-    if (scope->capture.state == CAPTURE_ARMED || scope->capture.state == CAPTURE_TRIGGERED || fault != scope->fault) {
-        scope_record(scope, drive, fault);
+    if (scope->capture.recording) {
+        scope_record(scope, drive);
     }
 }
 

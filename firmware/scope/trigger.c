@@ -21,7 +21,7 @@ void trigger_reset(capture_t *capture)
     capture->trigger_sign = downwards ? -1 : 1;
     capture->trigger_offset = downwards ? config->level : -config->level;
     capture->ready = !is_edge(capture);
-    capture->plain = false;
+    capture->search = SEARCH_ANY;
 }
 
 static condition_t condition(const capture_t *capture, column_t values)
@@ -59,8 +59,8 @@ static FX_NOT_INLINED uint32_t count_until(const condition_t *condition, uint32_
 static inline FX_INLINED_IF_OPTIMISED uint32_t count_until_in_periods(const condition_t *condition, uint32_t count)
 {
     const uint8_t *value = condition->values.from;
-    uint32_t k = 0;
-    for (; k + SEARCHED_AT_ONCE <= count; k += SEARCHED_AT_ONCE) {
+    uint32_t left = count;
+    for (; left >= SEARCHED_AT_ONCE; left -= SEARCHED_AT_ONCE) {
         int32_t signs = beyond(condition, value);
         FX_UNROLLED
         for (uint32_t j = 1; j < SEARCHED_AT_ONCE; j++) {
@@ -71,11 +71,11 @@ static inline FX_INLINED_IF_OPTIMISED uint32_t count_until_in_periods(const cond
         }
         value = &value[SEARCHED_AT_ONCE * sizeof(sample_t)];
     }
-    while (k < count && beyond(condition, value) < 0) {
+    while (left > 0U && beyond(condition, value) < 0) {
         value = &value[sizeof(sample_t)];
-        k++;
+        left--;
     }
-    return k;
+    return count - left;
 }
 
 /* Passes over the samples that must lie before the trigger; the last one counts, because an edge may follow it. */
@@ -115,12 +115,15 @@ static uint32_t until_trigger(capture_t *capture, const condition_t *reached, ui
     return capture->asked ? lesser(until, until_asked(capture)) : until;
 }
 
-/* From now on only a level in the samples of every period is waited for. */
-static bool is_plain(const capture_t *capture)
+/* Whether from now on only a level in the samples is waited for. */
+static capture_search_t search_of(const capture_t *capture)
 {
     const capture_config_t *config = &capture->config;
-    return capture->ready && !capture->asked && capture->filled >= config->before &&
-           config->trigger >= TRIGGER_RISING && config->divisor == 1U && capture->trigger_place < sizeof(sample_t);
+    if (!capture->ready || capture->asked || capture->filled < config->before || config->trigger < TRIGGER_RISING ||
+        capture->trigger_place >= sizeof(sample_t)) {
+        return SEARCH_ANY;
+    }
+    return (config->divisor == 1U) ? SEARCH_PERIODS : SEARCH_LEVEL;
 }
 
 /* Not inlined: the usual search needs fewer registers. */
@@ -129,16 +132,23 @@ static FX_NOT_INLINED uint32_t search_any(capture_t *capture, const sample_t *ne
     const condition_t reached = condition(capture, column_of_trigger(capture, next));
     const uint32_t until = until_trigger(capture, &reached, count);
     capture->filled = (uint16_t)lesser(capture->filled + until, capture->config.samples);
-    capture->plain = is_plain(capture);
+    capture->search = (uint8_t)search_of(capture);
     return until;
+}
+
+static FX_NOT_INLINED uint32_t search_level(const capture_t *capture, const sample_t *next, uint32_t count)
+{
+    const condition_t reached = condition(capture, column_of_trigger(capture, next));
+    return count_until(&reached, 0, count);
 }
 
 uint32_t trigger_search(capture_t *capture, const sample_t *next, uint32_t count)
 {
-    if (!capture->plain) {
-        return search_any(capture, next, count);
+    if (capture->search == (uint8_t)SEARCH_PERIODS) {
+        const column_t values = {(const uint8_t *)next + capture->trigger_place, sizeof(sample_t)};
+        const condition_t reached = condition(capture, values);
+        return count_until_in_periods(&reached, count);
     }
-    const column_t values = {(const uint8_t *)next + capture->trigger_place, sizeof(sample_t)};
-    const condition_t reached = condition(capture, values);
-    return count_until_in_periods(&reached, count);
+    return (capture->search == (uint8_t)SEARCH_LEVEL) ? search_level(capture, next, count)
+                                                      : search_any(capture, next, count);
 }

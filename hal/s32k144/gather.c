@@ -46,9 +46,8 @@ _Static_assert(sizeof(channel_t) == offsetof(dma_t, TCD1_SADDR) - offsetof(dma_t
 /* Of channels: distances in bytes from the first. */
 static struct {
     uint16_t last;  /* of a bank: from its first channel */
-    uint16_t bank;  /* of the part that was added last */
+    uint16_t bank;  /* of the next part, or of the one that was added last */
     uint16_t first; /* of the first part */
-    bool moved;     /* the columns, to the other bank */
     bool started;   /* since the set-up */
 } state;
 
@@ -99,20 +98,17 @@ void hal_gather_set_up(uint32_t columns, const uint32_t *stride, uint32_t row_si
 
 void hal_gather_move(uint32_t column, const void *from, int16_t *to)
 {
-    channel_t *channel = channel_at((state.bank ^ OTHER_BANK) + column * sizeof(channel_t));
+    if (column == 0U) {
+        state.bank ^= OTHER_BANK;
+    }
+    channel_t *channel = channel_at(state.bank + column * sizeof(channel_t));
     channel->SADDR = (uint32_t)(uintptr_t)from;
     channel->DADDR = (uint32_t)(uintptr_t)to;
-    state.moved = true;
 }
 
 /* Also the channels that are not used get their number of bytes: that is shorter than counting them. */
 void hal_gather_add(uint32_t count, bool is_further)
 {
-    const uint32_t before = state.bank;
-    if (state.moved) {
-        state.bank = (uint16_t)(before ^ OTHER_BANK);
-        state.moved = false;
-    }
     channel_t *channel = channel_at(state.bank);
     FX_ADDRESS_ONCE(channel);
     FX_UNROLLED
@@ -121,7 +117,7 @@ void hal_gather_add(uint32_t count, bool is_further)
     }
     channel_at((uint32_t)state.bank + state.last)->CSR = 0; /* neither DONE nor a link */
     if (is_further) {
-        channel_at(before + state.last)->CSR = (uint16_t)link_to(state.bank);
+        channel_at((state.bank ^ OTHER_BANK) + state.last)->CSR = (uint16_t)link_to(state.bank);
     } else {
         state.first = state.bank;
     }

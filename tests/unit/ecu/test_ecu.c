@@ -449,11 +449,12 @@ void test_the_first_fault_freezes_the_values_before_it(void)
         now.i_q_A = (int16_t)(10 * ms);
         now.speed_rpm = (ms == 99) ? 1e9F : -50.5F;
         now.fault_word = (ms >= 100) ? 4U : 0U;
-        freeze_frame_step(&frame, &now, 0, (ms < 100) ? STATE_RUN : STATE_FAULT, 1);
+        const bool changed = freeze_frame_step(&frame, &now, 0, (ms < 100) ? STATE_RUN : STATE_FAULT, 1);
+        TEST_ASSERT_EQUAL(ms == 100, changed);
     }
     now.i_q_A = 7;
     now.fault_word = 6U;
-    freeze_frame_step(&frame, &now, 1, STATE_FAULT, 1);
+    TEST_ASSERT_FALSE(freeze_frame_step(&frame, &now, 1, STATE_FAULT, 1));
     TEST_ASSERT_EQUAL_INT(1, frame.frozen);
     TEST_ASSERT_EQUAL_UINT32(100, frame.time_ms);
     TEST_ASSERT_EQUAL_UINT32(4, frame.fault_word);
@@ -469,10 +470,10 @@ void test_the_first_fault_freezes_the_values_before_it(void)
     TEST_ASSERT_EQUAL_INT(32767, frame.speed_rpm[(frame.oldest + 30U) % FREEZE_FRAME_SAMPLES]);
     /* After the reset it records again, and the next fault is frozen. */
     now.fault_word = 0;
-    freeze_frame_step(&frame, &now, 0, STATE_STANDBY, 1);
+    TEST_ASSERT_TRUE(freeze_frame_step(&frame, &now, 0, STATE_STANDBY, 1));
     TEST_ASSERT_EQUAL_INT(0, frame.frozen);
-    freeze_frame_step(&frame, &now, 0, STATE_STANDBY, 1);
-    freeze_frame_step(&frame, &now, 8, STATE_FAULT, 1);
+    TEST_ASSERT_FALSE(freeze_frame_step(&frame, &now, 0, STATE_STANDBY, 1));
+    TEST_ASSERT_TRUE(freeze_frame_step(&frame, &now, 8, STATE_FAULT, 1));
     TEST_ASSERT_EQUAL_INT(1, frame.frozen);
     TEST_ASSERT_EQUAL_INT(8, frame.ecu_faults);
     TEST_ASSERT_EQUAL_INT(STATE_STANDBY, frame.state);

@@ -7,8 +7,8 @@
 #include "hal/gather.h"
 
 typedef struct {
-    bool there; /* false: a port without the hardware */
-    bool stuck; /* a copy never ends */
+    bool there;                             /* false: a port without the hardware */
+    bool stuck;                             /* a copy never ends */
     uint32_t copies, parts, moves, set_ups; /* counted */
 } late_gather_t;
 

@@ -523,26 +523,26 @@ void test_what_is_searched_at_once(void)
 {
     arm_for(TRIGGER_ABOVE, NEVER);
     run_steps(2);
-    TEST_ASSERT_FALSE(capture.plain); /* 20 samples, and 25 must lie before */
+    TEST_ASSERT_EQUAL(SEARCH_ANY, capture.search); /* 20 samples, and 25 must lie before */
     run_steps(1);
-    TEST_ASSERT_TRUE(capture.plain);
+    TEST_ASSERT_EQUAL(SEARCH_PERIODS, capture.search);
     capture_trigger(&capture, newest + 4U);
-    TEST_ASSERT_FALSE(capture.plain);
+    TEST_ASSERT_EQUAL(SEARCH_ANY, capture.search);
     arm_for(TRIGGER_RISING, -30000); /* no edge: the signal is never below */
     run_steps(10);
-    TEST_ASSERT_FALSE(capture.plain);
+    TEST_ASSERT_EQUAL(SEARCH_ANY, capture.search);
     arm_for(TRIGGER_MANUAL, 0);
     run_steps(10);
-    TEST_ASSERT_FALSE(capture.plain);
+    TEST_ASSERT_EQUAL(SEARCH_ANY, capture.search);
     config.divisor = 2;
     arm_for(TRIGGER_ABOVE, NEVER);
     run_steps(10);
-    TEST_ASSERT_FALSE(capture.plain);
+    TEST_ASSERT_EQUAL(SEARCH_LEVEL, capture.search);
     config.divisor = 1;
     config.trigger_signal = CAPTURE_i_d_ref_A;
     arm_for(TRIGGER_ABOVE, NEVER);
     run_steps(10);
-    TEST_ASSERT_FALSE(capture.plain);
+    TEST_ASSERT_EQUAL(SEARCH_ANY, capture.search);
 }
 
 void test_eight_signals_of_all_kinds(void)

@@ -12,7 +12,7 @@
 
 static drive_t drive;
 static scope_t scope;
-static bool ecu_fault;
+static bool ecu_fault, was_fault;
 
 static scope_result_t command(const uint8_t *data, size_t length)
 {
@@ -30,11 +30,22 @@ static void run(uint32_t periods)
     }
 }
 
+/* The scope is told when a fault comes and when all have gone. */
+static void step(void)
+{
+    const bool is_fault = drive.fast.faults != 0U || ecu_fault;
+    if (is_fault != was_fault) {
+        scope_fault(&scope, &drive, is_fault);
+    }
+    was_fault = is_fault;
+    scope_step(&scope, &drive);
+}
+
 static void run_steps(uint32_t steps)
 {
     for (uint32_t k = 0; k < steps; k++) {
         run(10);
-        scope_step(&scope, &drive, ecu_fault);
+        step();
     }
 }
 
@@ -74,7 +85,7 @@ void setUp(void)
 {
     memset(&drive, 0, sizeof drive);
     memset(&scope, 0, sizeof scope);
-    ecu_fault = false;
+    ecu_fault = was_fault = false;
     run(7);
 }
 
@@ -180,7 +191,7 @@ void test_a_fault_leaves_a_freeze_frame_of_32_periods_on_both_sides(void)
     run(4);
     drive_raise_fault(&drive, FAULT_OVER_CURRENT); /* while the sample of period 212 is made */
     run(6);
-    scope_step(&scope, &drive, false);
+    step();
     TEST_ASSERT_EQUAL(CAPTURE_TRIGGERED, scope.capture.state);
     run_steps(3);
     TEST_ASSERT_EQUAL_UINT8(1, scope.capture.frozen);
@@ -293,7 +304,7 @@ void test_a_reference_stands_beside_the_periods_in_which_it_acts(void)
     for (int16_t n = 1; n <= 60; n++) {
         run(10); /* 8 to 17 before the first step, and so on */
         drive.task.i_ref.q = n;
-        scope_step(&scope, &drive, false);
+        step();
     }
     expect_trigger(500, 10);
     for (uint32_t k = 0; k < 40U; k++) {

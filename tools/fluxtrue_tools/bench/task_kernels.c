@@ -87,7 +87,7 @@ static void prepare_scopes(void)
     config.divisor = PERIODS_OF_A_STEP;
     arm(&seldom_scope, &config, before);
     const uint8_t mixed[CAPTURE_SIGNALS_MAX] = {
-        CAPTURE_i_d_A,     CAPTURE_i_d_ref_A,         CAPTURE_i_q_ref_A,         CAPTURE_torque_commanded_Nm,
+        CAPTURE_i_d_A,       CAPTURE_i_d_ref_A,           CAPTURE_i_q_ref_A,           CAPTURE_torque_commanded_Nm,
         CAPTURE_omega_rad_s, CAPTURE_torque_corrected_Nm, CAPTURE_torque_estimated_Nm, CAPTURE_psi_error_Vs};
     config.divisor = 1;
     memcpy(config.signal, mixed, sizeof mixed);
@@ -300,25 +300,25 @@ CALLED void task_second_level_frame(void)
 
 CALLED void task_scope_idle(void)
 {
-    scope_step(&idle_scope, the_copy(), false);
+    scope_step(&idle_scope, the_copy());
 }
 
 CALLED void task_scope_armed(void)
 {
-    scope_step(&armed_scope, the_copy(), false);
+    scope_step(&armed_scope, the_copy());
 }
 
 CALLED void task_scope_mixed(void)
 {
-    scope_step(&mixed_scope, the_copy(), false);
+    scope_step(&mixed_scope, the_copy());
 }
 
 CALLED void task_scope_seldom(void)
 {
-    scope_step(&seldom_scope, the_copy(), false);
+    scope_step(&seldom_scope, the_copy());
 }
 
 CALLED void task_scope_triggered(void)
 {
-    scope_step(&triggered_scope, the_copy(), false);
+    scope_step(&triggered_scope, the_copy());
 }
