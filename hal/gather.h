@@ -9,9 +9,9 @@
  * Source   docs/howto/port.md, docs/decisions/020-scope.md
  * Units    bytes, values
  * Range    1 ... HAL_GATHER_COLUMNS columns; more than one value in a part only if both distances are at most 32767
- *          bytes; hal_gather_wait() waits for up to 64 values of each column
- * Errors   a copy that does not end: hal_gather_is_idle() stays false, and hal_gather_wait() returns false
- * Context  1 kHz task; all but hal_gather_wait() only while idle */
+ *          bytes
+ * Errors   a copy that does not end: hal_gather_is_idle() stays false
+ * Context  1 kHz task; all others only while idle */
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -31,7 +31,5 @@ void hal_gather_move(uint32_t column, const void *from, int16_t *to);
 void hal_gather_add(uint32_t count, bool is_further);
 /** Begins to copy what has been added. */
 void hal_gather_start(void);
-/** Until what was started is complete; true if it is. At once without the hardware, with true. */
-bool hal_gather_wait(void);
 
 #endif

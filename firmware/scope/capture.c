@@ -2,7 +2,6 @@
 #include "scope/capture.h"
 
 #include "fx/codegen.h"
-#include "hal/gather.h"
 #include "scope/columns.h"
 #include "scope/trigger.h"
 
@@ -30,7 +29,7 @@ static FX_NOT_INLINED FX_COLD void begin(capture_t *capture, const capture_confi
                            .number = number,
                            .values = capture->values,
                            .coming = capture->coming,
-                           .recording = true};
+                           .recording = CAPTURE_RECORDS};
     columns_find(capture);
 }
 
@@ -67,7 +66,7 @@ void capture_trigger(capture_t *capture, uint32_t period)
 void capture_stop(capture_t *capture)
 {
     capture->state = CAPTURE_IDLE;
-    capture->recording = false;
+    capture->recording = CAPTURE_RECORDS_NOT;
 }
 
 static FX_NOT_INLINED FX_COLD void begin_after(capture_t *capture)
@@ -101,23 +100,23 @@ static void take(capture_t *capture, int16_t *memory, const sample_t *next, uint
     capture->run = (uint16_t)(capture->run - count);
 }
 
-/* A tool may read the memory as soon as the state says so. */
-static FX_NOT_INLINED FX_COLD void finish(capture_t *capture)
+/* A tool may read the memory as soon as the state says so: what the hardware copies in this step is complete in the
+ * next one. */
+static FX_NOT_INLINED FX_COLD void end(capture_t *capture)
 {
-    columns_end(capture);
-    capture->parts = GATHER_CLOSED;
-    if (!hal_gather_wait()) {
-        capture->lost++;
+    if (columns_are_pending(capture)) {
+        capture->recording = CAPTURE_ENDS;
+    } else {
+        capture->recording = CAPTURE_RECORDS_NOT;
+        capture->state = CAPTURE_DONE;
     }
-    capture->state = CAPTURE_DONE;
-    capture->recording = false;
 }
 
 static void count_triggered(capture_t *capture, uint32_t count)
 {
     capture->remaining = (uint16_t)(capture->remaining - count);
     if (capture->remaining == 0U) {
-        finish(capture);
+        end(capture);
     }
 }
 
@@ -151,14 +150,20 @@ static FX_NOT_INLINED FX_COLD void skip_lost_periods(capture_t *capture, uint32_
         capture->run = 0;
     } else {
         capture->taken = (uint16_t)(capture->taken - capture->remaining);
-        finish(capture);
+        end(capture);
     }
 }
 
 void capture_step(capture_t *capture, int16_t *memory, const sample_t *slot, uint32_t newest)
 {
     columns_begin(capture);
-    while ((int32_t)(newest - capture->next) >= 0 && capture->recording) {
+    while ((int32_t)(newest - capture->next) >= 0) {
+        if (capture->recording != (uint8_t)CAPTURE_RECORDS) {
+            if (capture->recording == (uint8_t)CAPTURE_ENDS) {
+                end(capture);
+            }
+            break;
+        }
         if (newest - capture->next >= USABLE) {
             skip_lost_periods(capture, newest);
         } else {

@@ -43,6 +43,13 @@ typedef enum {
     TRIGGERS = 6
 } capture_trigger_t;
 
+/** What a step has to do. */
+typedef enum {
+    CAPTURE_RECORDS_NOT = 0,
+    CAPTURE_RECORDS = 1, /* armed or triggered */
+    CAPTURE_ENDS = 2     /* triggered; the hardware copies the last samples */
+} capture_recording_t;
+
 /** What an armed capture waits for in its next samples. */
 typedef enum {
     SEARCH_ANY = 0,
@@ -54,7 +61,7 @@ typedef enum {
 
 /** How far the port's hardware that copies (hal/gather.h) is prepared. */
 typedef enum {
-    GATHER_NEVER = 0,      /* the memory is so small that one step may write a row twice: the order counts */
+    GATHER_NEVER = 0,      /* not in this capture: it failed, or a step may write the small memory twice */
     GATHER_NOT_SET_UP = 1, /* for this capture */
     GATHER_SET_UP = 2,
     GATHER_CONTINUES = 3 /* where the next sample lies */
@@ -94,7 +101,7 @@ typedef struct {
     uint8_t trigger_place;      /* of the trigger's signal: of the step from sizeof(sample_t) on */
     int8_t trigger_sign;        /* 1, or -1: triggers downwards */
     bool uses_step;             /* one of the signals, or the trigger's, is a value of the step */
-    bool recording;             /* armed or triggered */
+    uint8_t recording;          /* capture_recording_t */
     uint8_t gather;             /* capture_gather_t */
     uint8_t parts;              /* that the hardware has taken in this step; GATHER_CLOSED: it takes none */
     bool asked;

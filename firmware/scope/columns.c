@@ -48,6 +48,15 @@ static column_t column(const capture_t *capture, uint32_t k, const sample_t *nex
     return column_at(capture, places[capture->config.signal[k]], next);
 }
 
+void columns_refuse(capture_t *capture)
+{
+    capture->parts = GATHER_CLOSED;
+    if (capture->gather == GATHER_CONTINUES) {
+        capture->gather = GATHER_NEVER;
+        capture->lost++;
+    }
+}
+
 /* The place of the next row. */
 static int16_t *row(const capture_t *capture, int16_t *memory)
 {
@@ -55,7 +64,7 @@ static int16_t *row(const capture_t *capture, int16_t *memory)
 }
 
 /* By the processor. */
-static FX_NOT_INLINED void copy(const capture_t *capture, int16_t *memory, const sample_t *next, uint32_t count)
+static FX_NOT_INLINED void copy_rows(const capture_t *capture, int16_t *memory, const sample_t *next, uint32_t count)
 {
     const uint32_t signals = capture->config.signals;
     int16_t *first = row(capture, memory);
@@ -71,7 +80,7 @@ static FX_NOT_INLINED void copy(const capture_t *capture, int16_t *memory, const
     }
 }
 
-static FX_NOT_INLINED FX_COLD void set_up(const capture_t *capture)
+static FX_NOT_INLINED FX_COLD void set_up_columns(const capture_t *capture)
 {
     const uint32_t signals = capture->config.signals;
     uint32_t stride[CAPTURE_SIGNALS_MAX];
@@ -97,7 +106,7 @@ static FX_NOT_INLINED bool prepare(capture_t *capture, int16_t *memory, const sa
         return false;
     }
     if (capture->gather == GATHER_NOT_SET_UP) {
-        set_up(capture);
+        set_up_columns(capture);
     }
     move(capture, row(capture, memory), next);
     capture->gather = GATHER_CONTINUES;
@@ -119,7 +128,7 @@ static bool gather(capture_t *capture, int16_t *memory, const sample_t *next, ui
 void columns_copy(capture_t *capture, int16_t *memory, const sample_t *next, uint32_t count)
 {
     if (capture->parts >= HAL_GATHER_PARTS || !gather(capture, memory, next, count)) {
-        copy(capture, memory, next, count);
+        copy_rows(capture, memory, next, count);
         columns_move(capture);
     }
 }

@@ -41,10 +41,22 @@ static inline size_t stride_of(const capture_t *capture)
 void columns_find(capture_t *capture);
 /** The trigger's signal. */
 column_t column_of_trigger(const capture_t *capture, const sample_t *next);
-/** Before the first copy of a step: whether the port's hardware (hal/gather.h) is idle. */
+/** The port has no hardware (hal/gather.h), or a copy of the last step has not ended: this is counted, and this capture
+ * uses the hardware no more. */
+void columns_refuse(capture_t *capture);
+/** Before the first copy of a step. */
 static inline void columns_begin(capture_t *capture)
 {
-    capture->parts = hal_gather_is_idle() ? 0U : GATHER_CLOSED;
+    if (hal_gather_is_idle()) {
+        capture->parts = 0;
+    } else {
+        columns_refuse(capture);
+    }
+}
+/** The hardware copies samples of this step. */
+static inline bool columns_are_pending(const capture_t *capture)
+{
+    return capture->parts - 1U < HAL_GATHER_PARTS;
 }
 /** Copies `count` samples, at least one, of all captured signals, from the next period on. The samples must be contiguous
  * in the ring and in the memory. */
@@ -52,7 +64,7 @@ void columns_copy(capture_t *capture, int16_t *memory, const sample_t *next, uin
 /** After the last copy of a step: the hardware, if there is any, copies while the task continues. */
 static inline void columns_end(capture_t *capture)
 {
-    if (capture->parts - 1U < HAL_GATHER_PARTS) {
+    if (columns_are_pending(capture)) {
         hal_gather_start();
     }
 }

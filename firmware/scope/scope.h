@@ -48,7 +48,7 @@ void scope_record(scope_t *scope, const drive_t *drive);
 /** Once per step, after scope_fault(). */
 static inline void scope_step(scope_t *scope, const drive_t *drive)
 {
-    if (scope->capture.recording) {
+    if (scope->capture.recording != (uint8_t)CAPTURE_RECORDS_NOT) {
         scope_record(scope, drive);
     }
 }

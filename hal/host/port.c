@@ -177,11 +177,6 @@ void hal_gather_start(void)
 {
 }
 
-bool hal_gather_wait(void)
-{
-    return true;
-}
-
 void hal_watchdog_start(void)
 {
     active->board.watchdog_started = true;

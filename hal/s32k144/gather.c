@@ -14,10 +14,6 @@
 #define OTHER_BANK (HAL_GATHER_COLUMNS * (uint32_t)sizeof(channel_t))
 #define LINK ((uint32_t)DMA_TCD0_CSR_MAJORELINK | DMA_TCD0_CSR_MAJORLINKCH_MASK)
 #define HALF_WORDS (DMA_TCD0_ATTR_SSIZE(1) | DMA_TCD0_ATTR_DSIZE(1))
-/* Reads of the last channel's status, each at least 8 cycles: 64 values of 8 columns end within it even if each takes
- * 64 cycles. */
-#define POLLS 4096U
-
 /* The registers of one channel. */
 typedef struct {
     volatile uint32_t SADDR;
@@ -128,13 +124,4 @@ void hal_gather_start(void)
     channel_t *first = channel_at(state.first);
     state.started = true;
     set_status(first, (first->CSR & LINK) | DMA_TCD0_CSR_START);
-}
-
-bool hal_gather_wait(void)
-{
-    uint32_t polls = POLLS;
-    while (!hal_gather_is_idle() && polls > 0U) {
-        polls--;
-    }
-    return hal_gather_is_idle();
 }

@@ -35,9 +35,3 @@ void hal_gather_add(uint32_t count, bool is_further)
 void hal_gather_start(void)
 {
 }
-
-/* Write: wait until the last channel has ended, with a limit. */
-bool hal_gather_wait(void)
-{
-    return true;
-}

@@ -122,9 +122,3 @@ void hal_gather_start(void)
     copying = true;
     late_gather.copies++;
 }
-
-bool hal_gather_wait(void)
-{
-    late_gather_end();
-    return !copying;
-}

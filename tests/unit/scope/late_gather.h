@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TESTS_UNIT_SCOPE_LATE_GATHER_H
 #define TESTS_UNIT_SCOPE_LATE_GATHER_H
-/** The HAL's copies as late as hardware may make them: nothing has been copied until the test lets the copy end, or
- * until the firmware waits for it. It fails the test if it is used while it is not idle.
+/** The HAL's copies as late as hardware may make them: nothing has been copied until the test lets the copy end. It
+ * fails the test if it is used while it is not idle.
  * Context  unit tests */
 #include "hal/gather.h"
 

@@ -292,7 +292,7 @@ void test_the_samples_before_the_trigger_outlast_many_turns_of_the_memory(void)
     arm_for(TRIGGER_MANUAL, 0);
     run_steps(57);
     capture_trigger(&capture, newest + 1);
-    run_steps(8);
+    run_steps(9);
     TEST_ASSERT_EQUAL_UINT32(574, trigger_period());
     TEST_ASSERT_NOT_EQUAL(0, capture.first);
     expect_periods();
@@ -672,7 +672,7 @@ void test_a_freeze_frame_may_begin_with_the_period_that_is_being_made(void)
     run_steps(30);
     freeze(newest + 1);
     step();
-    run_steps(4);
+    run_steps(5);
     TEST_ASSERT_EQUAL_UINT16(32, capture.before);
     expect_periods();
 }
