@@ -151,13 +151,6 @@ static inline uint32_t fx_arch_pkhbt(int32_t lo, int32_t hi)
     return y;
 }
 
-static inline uint32_t fx_arch_pkhbt_unshifted(int32_t lo, int32_t hi)
-{
-    uint32_t y;
-    __asm__("pkhbt %0, %1, %2" : "=r"(y) : "r"(lo), "r"(hi));
-    return y;
-}
-
 static inline uint32_t fx_arch_pkhtb(int32_t hi, int32_t lo)
 {
     uint32_t y;

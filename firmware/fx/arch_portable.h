@@ -103,12 +103,6 @@ static inline uint32_t fx_arch_pkhbt(int32_t lo, int32_t hi)
     return ((uint32_t)lo & 0xFFFFU) | ((uint32_t)hi << 16);
 }
 
-/* The lower half of one word, the upper half of the other. */
-static inline uint32_t fx_arch_pkhbt_unshifted(int32_t lo, int32_t hi)
-{
-    return ((uint32_t)lo & 0xFFFFU) | ((uint32_t)hi & 0xFFFF0000U);
-}
-
 /* The upper halves of both words. */
 static inline uint32_t fx_arch_pkhtb(int32_t hi, int32_t lo)
 {

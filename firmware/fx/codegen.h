@@ -33,7 +33,6 @@
  *   FX_NOT_INLINED            210 bytes of the control library; the fast ISR would have 1 less without
  *   FX_INLINED                104 instructions of the 1 kHz task
  *   FX_INLINES_CALLS          108 instructions of the fast ISR
- *   fx_load_nine_words        35 instructions of a step of the scope, with fx_store_four_words
  * Source   our own measurement; Arm v7-M ARM A7.7.50 (LDRD needs word alignment only)
  * Units    none
  * Range    every value and every address of two words
@@ -107,60 +106,6 @@ static inline fx_two_words_t fx_load_two_words(const int32_t *from)
     return y;
 #else
     return *(const fx_two_words_t *)from;
-#endif
-}
-
-/* Of an array of smaller objects: it is also written by words. */
-#define FX_WORD_ALIGNED __attribute__((aligned(4)))
-
-/* Words that follow one another: loaded by one LDM, stored by one STM. */
-typedef struct {
-    int32_t a, b, c, d, e, f, g, h, i;
-} FX_ANY_OBJECT fx_nine_words_t;
-
-typedef struct {
-    int32_t a, b, c, d;
-} FX_ANY_OBJECT fx_four_words_t;
-
-static inline fx_nine_words_t fx_load_nine_words(const fx_nine_words_t *from)
-{
-#ifdef __ARM_FEATURE_DSP
-    register int32_t a __asm__("r3");
-    register int32_t b __asm__("r4");
-    register int32_t c __asm__("r5");
-    register int32_t d __asm__("r6");
-    register int32_t e __asm__("r7");
-    register int32_t f __asm__("r8");
-    register int32_t g __asm__("r9");
-    register int32_t h __asm__("r10");
-    register int32_t i __asm__("r11");
-    __asm__("ldm %9, {r3-r11}"
-            : "=r"(a), "=r"(b), "=r"(c), "=r"(d), "=r"(e), "=r"(f), "=r"(g), "=r"(h), "=r"(i)
-            : "r"(from), "m"(*from));
-    return (fx_nine_words_t){a, b, c, d, e, f, g, h, i};
-#else
-    return *from;
-#endif
-}
-
-/* Returns the address behind them. Fewest moves if the words are computed from those of fx_load_nine_words(). */
-static inline fx_four_words_t *fx_store_four_words(fx_four_words_t *to, fx_four_words_t words)
-{
-#ifdef __ARM_FEATURE_DSP
-    fx_four_words_t *at = to;
-    register int32_t a __asm__("r3");
-    register int32_t b __asm__("r5");
-    register int32_t c __asm__("r7");
-    register int32_t d __asm__("r8");
-    a = words.a;
-    b = words.b;
-    c = words.c;
-    d = words.d;
-    __asm__("stm %0!, {r3, r5, r7, r8}" : "+r"(at), "=m"(*to) : "r"(a), "r"(b), "r"(c), "r"(d));
-    return at;
-#else
-    *to = words;
-    return &to[1];
 #endif
 }
 

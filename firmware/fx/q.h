@@ -89,18 +89,6 @@ static inline fx_pair_t fx_pair(int32_t lo, int32_t hi)
     return fx_arch_pkhbt(lo, hi);
 }
 
-/* The lower half of a word below the upper half of another one. */
-static inline fx_pair_t fx_pair_lower_upper(int32_t lo, int32_t hi)
-{
-    return fx_arch_pkhbt_unshifted(lo, hi);
-}
-
-/* The upper halves of two words. */
-static inline fx_pair_t fx_pair_uppers(int32_t lo, int32_t hi)
-{
-    return fx_arch_pkhtb(hi, lo);
-}
-
 /* The differences of the halves, each saturated. */
 static inline fx_pair_t fx_pair_sub(fx_pair_t a, fx_pair_t b)
 {

@@ -35,7 +35,7 @@ typedef enum { SCOPE_OK, SCOPE_UNKNOWN, SCOPE_TOO_SHORT, SCOPE_OUT_OF_RANGE, SCO
 typedef struct {
     capture_t capture;      /* first: what tools read begins here */
     capture_config_t setup; /* as the commands have left it; acts when it is armed */
-    FX_WORD_ALIGNED int16_t memory[CAPTURE_MEMORY];
+    int16_t memory[CAPTURE_MEMORY];
 } scope_t;
 
 /** command: without the protocol's own code. */

@@ -109,9 +109,6 @@ void proof_fx_pair(void)
     int32_t low, high;
     const fx_pair_t pair = fx_pair(low, high);
     PROVE(lower(pair) == lower((uint32_t)low) && upper(pair) == lower((uint32_t)high));
-    const fx_pair_t uppers = fx_pair_uppers(low, high), lower_upper = fx_pair_lower_upper(low, high);
-    PROVE(upper(uppers) == upper((uint32_t)high) && lower(uppers) == upper((uint32_t)low));
-    PROVE(upper(lower_upper) == upper((uint32_t)high) && lower(lower_upper) == lower((uint32_t)low));
 }
 
 void proof_fx_dual_products(void)

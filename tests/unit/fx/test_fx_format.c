@@ -169,9 +169,6 @@ static void words_unchanged(int32_t a, int32_t b)
     expect_equal("FX_LOAD_TWO, second", a, b, two.second, b);
     const int32_t pair[3] = {~a, a, b};
     expect_equal("fx_load_two_words", a, b, fx_load_two_words(&pair[1]).second, b);
-    const fx_nine_words_t nine = {a, b, a, b, a, b, a, b, b};
-    expect_equal("fx_load_nine_words, first", a, b, fx_load_nine_words(&nine).a, a);
-    expect_equal("fx_load_nine_words, last", a, b, fx_load_nine_words(&nine).i, b);
     const volatile uint32_t registers[3] = {~(uint32_t)a, (uint32_t)a, (uint32_t)b};
     expect_equal("fx_read_two, first", a, b, fx_read_two(&registers[1]).first, a);
     expect_equal("fx_read_two, second", a, b, fx_read_two(&registers[1]).second, b);

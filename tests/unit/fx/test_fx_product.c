@@ -173,9 +173,6 @@ static void dual(const q15_t v[4], int32_t acc)
     expect_equal("fx_pair", v[0], v[1], (int64_t)a,
                  ((int64_t)v[1] < 0 ? v[1] + INT64_C(65536) : v[1]) * 65536 +
                      (v[0] < 0 ? v[0] + INT64_C(65536) : v[0]));
-    const int32_t first = v[0] * 65536 + (uint16_t)v[2], second = v[1] * 65536 + (uint16_t)v[3];
-    expect_equal("fx_pair_uppers", first, second, fx_pair_uppers(first, second), a);
-    expect_equal("fx_pair_lower_upper", first, second, fx_pair_lower_upper(first, second), fx_pair(v[2], v[1]));
     expect_equal("fx_dot2", v[0], v[1], fx_dot2(a, b), wrapped(dot));
     expect_equal("fx_dot2_acc", v[0], v[1], fx_dot2_acc(acc, a, b), wrapped(acc + dot));
     const long double crossed = ((long double)v[0] * v[3]) + ((long double)v[1] * v[2]);
