@@ -7,30 +7,37 @@
  * cycles of the system clock for a channel and 8 for each half word. The manual states 4 to start and 3 to end a
  * channel, and 1 for each read and each write without wait states.
  *
- * documented behaviour                               | modelled | test
- * -------------------------------------------------- | -------- | --------------------------------------------
- * START: a minor loop of NBYTES is copied            | yes      | test_a_program_starts_a_copy_and_waits_for_it
- * START reads 0, ACTIVE 1 while the channel runs     | yes      | test_a_channel_is_active_until_it_is_done
- * DONE at the end; START clears it, software clears it | yes    | test_done_is_cleared_by_a_start_and_by_software
- * the copy takes its time                            | yes      | test_a_copy_arrives_at_the_end_of_its_time
- * SOFF and DOFF are signed, 16 bits                  | yes      | test_offsets_are_signed
- * SADDR and DADDR end behind the last half word      | yes      | test_the_addresses_move_to_the_end_of_the_copy
- * SLAST and DLASTSGA are added at the end            | yes      | test_the_last_adjustments_are_added
- * MAJORELINK: the end of a channel starts another    | yes      | test_the_end_of_a_channel_starts_the_linked_one
- * MAJORELINK is written as 0 while DONE is set       | yes      | test_a_link_is_lost_while_done_is_set
- * descriptors are undefined after a reset            | refused  | test_an_incomplete_descriptor_is_refused
- * DONE after a reset: assumed to be set              | yes      | test_a_link_is_lost_while_done_is_undefined
- * a descriptor in use must not be written            | refused  | test_a_descriptor_in_use_is_not_written
- * arbitration between channels                       | refused  | test_a_second_channel_is_refused
- * configuration errors: alignment, NBYTES, counts    | refused  | test_configuration_errors_are_refused
- * bus errors: source and destination without memory  | refused  | test_a_copy_outside_the_memory_is_refused
- * RAM that is retained must not be accessed          | refused  | test_a_copy_of_retained_ram_is_refused
- * other sizes, modulo, several minor loops           | refused  | test_other_transfers_are_refused
- * interrupts, scatter-gather, DREQ, BWC              | refused  | test_other_controls_are_refused
- * hardware requests, priorities, EMLM                | refused  | test_other_controls_are_refused
- * clear and set registers (CDNE, SSRT, ...)          | refused  | test_other_controls_are_refused
- * a reset ends a copy before it has begun            | yes      | test_a_reset_ends_a_copy
- * a copy of which a reset leaves a part              | no       | -
+ * documented behaviour                             | modelled | test
+ * ------------------------------------------------ | -------- | --------------------------------------------
+ * START: a minor loop of NBYTES is copied          | yes      | test_a_program_starts_a_copy_and_waits_for_it
+ * START reads 0, ACTIVE 1 while the channel runs   | yes      | test_a_channel_is_active_until_it_is_done
+ * DONE: cleared by software, by a start            | yes      | test_done_is_cleared_by_software_and_by_a_start
+ * the copy takes its time                          | yes      | test_a_copy_arrives_at_the_end_of_its_time
+ * its time counts the system clock                 | yes      | test_a_slower_clock_lengthens_a_copy
+ * SOFF and DOFF are signed                         | yes      | test_offsets_are_signed
+ * a copy overlaps its own source                   | yes      | test_a_copy_may_overlap_its_source
+ * SADDR, DADDR end behind the last half word       | yes      | test_the_addresses_move_to_the_end_of_the_copy
+ * SLAST and DLASTSGA are added at the end          | yes      | test_the_last_adjustments_are_added
+ * MAJORELINK: the end starts another channel       | yes      | test_the_end_of_a_channel_starts_the_linked_one
+ * MAJORELINK is written as 0 while DONE is set     | yes      | test_a_link_is_lost_while_done_is_set
+ * DONE is undefined after a reset: assumed set     | yes      | test_a_link_is_lost_while_done_is_undefined
+ * descriptors are undefined after a reset          | refused  | test_an_incomplete_descriptor_is_refused
+ * undefined fields must not be relied on           | refused  | test_an_undefined_field_is_not_read
+ * a descriptor in use must not be written          | refused  | test_a_descriptor_in_use_is_not_written
+ * an active channel's addresses move               | refused  | test_the_addresses_of_an_active_channel_are_not_read
+ * arbitration between channels                     | refused  | test_a_second_channel_is_refused
+ * configuration errors: alignment, size, counts    | refused  | test_configuration_errors_are_refused
+ * bus errors: addresses without memory             | refused  | test_a_copy_outside_the_memory_is_refused
+ * RAM that is retained must not be accessed        | refused  | test_a_copy_of_retained_ram_is_refused
+ * other sizes, modulo, several minor loops         | refused  | test_other_transfers_are_refused
+ * interrupts, scatter-gather, DREQ, BWC            | refused  | test_other_controls_are_refused
+ * requests by hardware, priorities, EMLM, CDNE     | refused  | test_other_controls_are_refused
+ * one access to two fields of a descriptor         | refused  | test_two_fields_are_not_written_at_once
+ * ES and ERR: what fails is refused before         | yes      | test_no_error_is_reported
+ * code that has been copied runs                   | yes      | test_copied_code_runs
+ * a reset ends a copy                              | yes      | test_a_reset_ends_a_copy
+ * a part of the copy that a reset leaves           | no       | -
+ * waiting for the bus: core and DMA at one memory  | no       | -
  */
 #include "emu_private.h"
 
@@ -134,7 +141,6 @@ static bool lies_in(uint32_t base, uint32_t size, uint32_t first, int32_t step, 
     return from >= 0 && last >= 0 && from <= (int64_t)size - HALF_WORD && last <= (int64_t)size - HALF_WORD;
 }
 
-/* Of an address below the upper RAM too, if the steps lead there; of one in the flash, never. */
 static bool reaches_upper(uint32_t first, int32_t step, uint32_t count)
 {
     const int64_t last = (int64_t)first + (int64_t)step * (count - 1U);
@@ -190,16 +196,23 @@ static void begin(emu_t *emu, uint32_t channel)
     }
 }
 
-/* One half word after the other, as the controller does: a copy may overlap its source. */
+/* One half word after the other, as the controller does: a copy may overlap its source. What unicorn has translated of
+ * the destination is discarded here, because it stays in use when memory is written from outside. */
 static void copy(emu_t *emu, copy_t c)
 {
+    const uint32_t other = c.destination + (c.count - 1U) * (uint32_t)c.destination_step;
+    const uint32_t first = c.destination < other ? c.destination : other;
+    const uint32_t size = c.destination + other - 2U * first + HALF_WORD;
     for (uint32_t k = 0; k < c.count; k++) {
         uint8_t half_word[HALF_WORD];
         (void)uc_mem_read(emu->uc, c.source, half_word, sizeof half_word);
         (void)uc_mem_write(emu->uc, c.destination, half_word, sizeof half_word);
-        emu_code_changed(emu, c.destination, HALF_WORD);
         c.source += (uint32_t)c.source_step;
         c.destination += (uint32_t)c.destination_step;
+    }
+    emu_code_changed(emu, first, size);
+    if (uc_ctl_remove_cache(emu->uc, first, first + size) != UC_ERR_OK) {
+        emu_fail(emu, "DMA: translated code cannot be discarded");
     }
 }
 

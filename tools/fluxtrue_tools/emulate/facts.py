@@ -18,9 +18,9 @@ from pathlib import Path
 from fluxtrue_tools.outputs import write_text
 
 PERIPHERALS = (
-    "MSCM", "FTFC", "DMA", "DMAMUX", "CAN0", "FTM0", "FTM2", "ADC0", "ADC1", "LPSPI0", "LPSPI1", "LPSPI2", "PDB0", "PDB1",
-    "LPIT0", "SIM", "PORTA", "PORTB", "PORTC", "PORTD", "PORTE", "WDOG", "TRGMUX", "SCG", "PCC", "PMC", "SMC", "RCM",
-    "PTA", "PTB", "PTC", "PTD", "PTE", "MCM", "LMEM",
+    "MSCM", "FTFC", "DMA", "DMAMUX", "CAN0", "FTM0", "FTM2", "ADC0", "ADC1", "LPSPI0", "LPSPI1", "LPSPI2", "PDB0",
+    "PDB1", "LPIT0", "SIM", "PORTA", "PORTB", "PORTC", "PORTD", "PORTE", "WDOG", "TRGMUX", "SCG", "PCC", "PMC", "SMC",
+    "RCM", "PTA", "PTB", "PTC", "PTD", "PTE", "MCM", "LMEM",
 )  # fmt: skip
 
 # Masks that differ from the SVD's fields: the watchdog's counter register also takes 32-bit commands.
