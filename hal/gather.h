@@ -23,11 +23,11 @@ bool hal_gather_is_idle(void);
 /** Number of columns, and bytes from one row to the next; stride: of each column, the bytes from one half word to the
  * next, 0: it is always the same. All columns must be moved before the next part. */
 void hal_gather_set_up(uint32_t columns, const uint32_t *stride, uint32_t row_size);
-/** Where the column's next half word comes from, and where it goes: of all columns one after the other, column 0 first.
+/** Where the column's next half word comes from, and where it goes: all columns one after the other, column 0 first.
  * Columns from the number of the set-up on may be moved, too, and are not copied. */
 void hal_gather_move(uint32_t column, const void *from, int16_t *to);
-/** The next `count` values, at least one, of each column. is_further: not the first part since the last start; there are
- * at most HAL_GATHER_PARTS, and the columns of a further one have been moved. */
+/** The next `count` values, at least one, of each column. is_further: not the first part since the last start; there
+ * are at most HAL_GATHER_PARTS, and the columns of a further one have been moved. */
 void hal_gather_add(uint32_t count, bool is_further);
 /** Begins to copy what has been added. */
 void hal_gather_start(void);

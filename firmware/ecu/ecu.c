@@ -240,11 +240,9 @@ void ecu_task_1khz(ecu_t *ecu)
     service_watchdog(ecu);
     answer(ecu);
     xcp_access_step(&ecu->xcp, &ecu->drive, ecu->clock.passed_ms);
-    if (freeze_frame_step(&ecu->freeze, &ecu->xcp.measurements, ecu->supervisor.faults, (uint8_t)ecu->supervisor.state,
-                          ecu->clock.passed_ms)) {
-        scope_fault(&ecu->scope, &ecu->drive, ecu->freeze.frozen != 0U);
-    }
-    scope_step(&ecu->scope, &ecu->drive);
+    const bool changed = freeze_frame_step(&ecu->freeze, &ecu->xcp.measurements, ecu->supervisor.faults,
+                                           (uint8_t)ecu->supervisor.state, ecu->clock.passed_ms);
+    scope_step(&ecu->scope, &ecu->drive, changed, ecu->freeze.frozen != 0U);
     send_frames(ecu);
     send_xcp(ecu);
     ecu_seal_flags(ecu);

@@ -135,7 +135,7 @@ static void end_fault(capture_t *capture)
     }
 }
 
-FX_COLD void scope_fault(scope_t *scope, const drive_t *drive, bool fault)
+FX_NOT_INLINED FX_COLD void scope_follow_fault(scope_t *scope, const drive_t *drive, bool fault)
 {
     const uint32_t newest = drive->samples.generation; /* read once: a freeze frame may use the whole ring */
     if (fault) {

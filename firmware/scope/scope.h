@@ -41,13 +41,16 @@ typedef struct {
 /** command: without the protocol's own code. */
 scope_result_t scope_command(scope_t *scope, const drive_t *drive, const uint8_t *command, uint8_t length);
 /** fault: one has come, to the drive or to the ECU, and there was none; else all have gone. */
-void scope_fault(scope_t *scope, const drive_t *drive, bool fault);
+void scope_follow_fault(scope_t *scope, const drive_t *drive, bool fault);
 /** A step of the scope while it records. */
 void scope_record(scope_t *scope, const drive_t *drive);
 
-/** Once per step, after scope_fault(). */
-static inline void scope_step(scope_t *scope, const drive_t *drive)
+/** Once per step. changed: whether there is a fault differs from the last step. */
+static inline void scope_step(scope_t *scope, const drive_t *drive, bool changed, bool fault)
 {
+    if (changed) {
+        scope_follow_fault(scope, drive, fault);
+    }
     if (scope->capture.recording != (uint8_t)CAPTURE_RECORDS_NOT) {
         scope_record(scope, drive);
     }

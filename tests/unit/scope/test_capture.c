@@ -452,7 +452,7 @@ void test_the_hardware_continues_until_ring_or_memory_begin_again(void)
 }
 
 /* Where ring and memory begin again in the same step, it has a third part. */
-void test_the_processor_copies_what_the_hardware_has_no_room_for(void)
+void test_the_processor_copies_the_third_part_of_a_step(void)
 {
     late_gather_reset(true);
     config.samples = 70;

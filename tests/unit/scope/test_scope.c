@@ -34,11 +34,9 @@ static void run(uint32_t periods)
 static void step(void)
 {
     const bool is_fault = drive.fast.faults != 0U || ecu_fault;
-    if (is_fault != was_fault) {
-        scope_fault(&scope, &drive, is_fault);
-    }
+    const bool changed = is_fault != was_fault;
     was_fault = is_fault;
-    scope_step(&scope, &drive);
+    scope_step(&scope, &drive, changed, is_fault);
 }
 
 static void run_steps(uint32_t steps)

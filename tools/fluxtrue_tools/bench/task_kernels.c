@@ -300,25 +300,25 @@ CALLED void task_second_level_frame(void)
 
 CALLED void task_scope_idle(void)
 {
-    scope_step(&idle_scope, the_copy());
+    scope_step(&idle_scope, the_copy(), false, false);
 }
 
 CALLED void task_scope_armed(void)
 {
-    scope_step(&armed_scope, the_copy());
+    scope_step(&armed_scope, the_copy(), false, false);
 }
 
 CALLED void task_scope_mixed(void)
 {
-    scope_step(&mixed_scope, the_copy());
+    scope_step(&mixed_scope, the_copy(), false, false);
 }
 
 CALLED void task_scope_seldom(void)
 {
-    scope_step(&seldom_scope, the_copy());
+    scope_step(&seldom_scope, the_copy(), false, false);
 }
 
 CALLED void task_scope_triggered(void)
 {
-    scope_step(&triggered_scope, the_copy());
+    scope_step(&triggered_scope, the_copy(), false, false);
 }
