@@ -18,9 +18,14 @@ _Static_assert(FROM_STEP + sizeof(scope_step_values_t) <= UINT8_MAX, "a place is
 _Static_assert(CAPTURE_SIGNALS_MAX <= HAL_GATHER_COLUMNS, "a column of the hardware for each signal");
 _Static_assert(SAMPLE_SLOTS * sizeof(sample_t) <= INT16_MAX, "several rows in the ring have such a distance");
 
+static bool is_of_step(uint8_t place)
+{
+    return place >= FROM_STEP;
+}
+
 static column_t column_at(const capture_t *capture, uint8_t place, const sample_t *next)
 {
-    if (place >= FROM_STEP) {
+    if (is_of_step(place)) {
         return (column_t){(const uint8_t *)&capture->values + (place - FROM_STEP), 0};
     }
     return (column_t){(const uint8_t *)next + place, stride_of(capture)};
@@ -31,9 +36,9 @@ void columns_find(capture_t *capture)
     const capture_config_t *config = &capture->config;
     capture->gather = (config->samples >= SAMPLE_SLOTS) ? GATHER_NOT_SET_UP : GATHER_NEVER;
     capture->trigger_place = places[config->trigger_signal];
-    capture->uses_step = capture->trigger_place >= FROM_STEP;
+    capture->uses_step = is_of_step(capture->trigger_place);
     for (uint8_t k = 0; k < config->signals; k++) {
-        capture->uses_step = capture->uses_step || places[config->signal[k]] >= FROM_STEP;
+        capture->uses_step = capture->uses_step || is_of_step(places[config->signal[k]]);
     }
 }
 
@@ -85,7 +90,7 @@ static FX_NOT_INLINED FX_COLD void set_up_columns(const capture_t *capture)
     const uint32_t signals = capture->config.signals;
     uint32_t stride[CAPTURE_SIGNALS_MAX];
     for (uint32_t k = 0; k < signals; k++) {
-        stride[k] = (uint32_t)column(capture, k, NULL).stride;
+        stride[k] = is_of_step(places[capture->config.signal[k]]) ? 0U : (uint32_t)stride_of(capture);
     }
     hal_gather_set_up(signals, stride, signals * (uint32_t)sizeof(int16_t));
 }

@@ -58,8 +58,8 @@ static inline bool columns_are_pending(const capture_t *capture)
 {
     return capture->parts - 1U < HAL_GATHER_PARTS;
 }
-/** Copies `count` samples, at least one, of all captured signals, from the next period on; in the ring and in the memory
- * they are contiguous. */
+/** Copies `count` samples, at least one, of all captured signals, from the next period on; they are contiguous in the
+ * ring and in the memory. */
 void columns_copy(capture_t *capture, int16_t *memory, const sample_t *next, uint32_t count);
 /** After the last copy of a step: the hardware, if there is any, copies while the task continues. */
 static inline void columns_end(capture_t *capture)

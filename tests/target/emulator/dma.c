@@ -160,20 +160,27 @@ static const char *refusal(const emu_t *emu, uint32_t channel)
     const uint32_t bytes = field(emu, channel, NBYTES);
     if (emu->s.dma.written[channel] != EVERY_FIELD) {
         return "a field of its descriptor has not been written since the reset";
-    } else if (field(emu, channel, ATTR) != HALF_WORDS) {
+    }
+    if (field(emu, channel, ATTR) != HALF_WORDS) {
         return "only half words without modulo are modelled (ATTR)";
-    } else if (field(emu, channel, CITER) != 1U || field(emu, channel, BITER) != 1U) {
+    }
+    if (field(emu, channel, CITER) != 1U || field(emu, channel, BITER) != 1U) {
         return "only one minor loop without a link is modelled (CITER = BITER = 1)";
-    } else if (bytes == 0U || bytes % HALF_WORD != 0U || bytes > RAM_SIZE) {
+    }
+    if (bytes == 0U || bytes % HALF_WORD != 0U || bytes > RAM_SIZE) {
         return "NBYTES is 0, odd or more than the RAM";
-    } else if (((c.source | c.destination | (uint32_t)c.source_step | (uint32_t)c.destination_step) & 1U) != 0U) {
+    }
+    if (((c.source | c.destination | (uint32_t)c.source_step | (uint32_t)c.destination_step) & 1U) != 0U) {
         return "an address or an offset is odd";
-    } else if (!lies_in(0, FLASH_SIZE, c.source, c.source_step, c.count) &&
-               !lies_in(RAM_BASE, RAM_SIZE, c.source, c.source_step, c.count)) {
+    }
+    if (!lies_in(0, FLASH_SIZE, c.source, c.source_step, c.count) &&
+        !lies_in(RAM_BASE, RAM_SIZE, c.source, c.source_step, c.count)) {
         return "the source lies neither in the flash nor in the RAM";
-    } else if (!lies_in(RAM_BASE, RAM_SIZE, c.destination, c.destination_step, c.count)) {
+    }
+    if (!lies_in(RAM_BASE, RAM_SIZE, c.destination, c.destination_step, c.count)) {
         return "the destination does not lie in the RAM";
-    } else if (is_closed(emu, &c)) {
+    }
+    if (is_closed(emu, &c)) {
         return "SIM.CHIPCTL.SRAMU_RETEN keeps its RAM from being accessed";
     }
     return NULL;
@@ -211,6 +218,7 @@ static void copy(emu_t *emu, copy_t c)
         c.destination += (uint32_t)c.destination_step;
     }
     emu_code_changed(emu, first, size);
+    // NOLINTNEXTLINE(clang-analyzer-optin.core.EnumCastOutOfRange): Unicorn's flags are made to be combined
     if (uc_ctl_remove_cache(emu->uc, first, first + size) != UC_ERR_OK) {
         emu_fail(emu, "DMA: translated code cannot be discarded");
     }
