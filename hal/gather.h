@@ -29,7 +29,7 @@ void hal_gather_move(uint32_t column, const void *from, int16_t *to);
 /** The next `count` values, at least one, of each column. is_further: not the first part since the last start; there
  * are at most HAL_GATHER_PARTS, and the columns of a further one have been moved. */
 void hal_gather_add(uint32_t count, bool is_further);
-/** Begins to copy what has been added. */
-void hal_gather_start(void);
+/** Begins to copy what has been added since the last start: so many parts. */
+void hal_gather_start(uint32_t parts);
 
 #endif

@@ -173,6 +173,7 @@ typedef struct {
     q15_t torque_corrected;      /* after the torque loop: input of the current reference */
     run_state_t run_state;
     uint8_t excessive; /* steps in a row with too much torque in field weakening; saturates */
+    bool armed;        /* has run since the safe state was last freewheel: the bridge is powered */
     pulsing_t pulsing;
     movement_state_t movement;
     safe_state_state_t safe_state;
@@ -180,7 +181,6 @@ typedef struct {
     short_side_state_t short_side;
     switch_off_t switch_off;
     recall_t recall;
-    bool armed;                     /* has run since the safe state was last freewheel: the bridge is powered */
     uint32_t fault_resets_asked;    /* of the request, as far as seen */
     uint32_t fault_resets;          /* passed on to the fast ISR */
     uint32_t identification_resets; /* of the request, as far as carried out by the task */

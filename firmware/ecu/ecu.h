@@ -45,6 +45,7 @@ typedef struct {
     step_clock_t clock;
     can_rx_t rx;
     commanded_t commanded; /* of rx */
+    uint16_t not_sent;
     can_tx_t tx;
     second_level_t second_level;
     supervisor_t supervisor;
@@ -56,9 +57,8 @@ typedef struct {
     settling_t settling;
     battery_voltage_t battery_voltage;
     dc_jump_state_t dc_jump;
-    shut_off_t shut_off;
     uint8_t question; /* of the external watchdog, at the start of the step */
-    uint16_t not_sent;
+    shut_off_t shut_off;
     xcp_access_t xcp;
     freeze_frame_t freeze;
     scope_t scope;

@@ -119,16 +119,16 @@ typedef struct {
 
 typedef struct {
     ecu_state_t state;
-    uint32_t us; /* in this state, including the present step; saturates */
+    refused_t refused;
     uint16_t faults;
-    uint8_t first_fault, fault_count; /* first: 1 ... 32 drive faults, 33 ... ecu faults */
+    uint32_t us; /* in this state, including the present step; saturates */
     uint32_t drive_faults_seen;
+    uint32_t resets;              /* granted, counted up */
     uint8_t reset_pending;        /* steps until the drive has carried out a reset */
     bool enable_seen, reset_seen; /* as the last live command had them */
     bool enabled;
-    refused_t refused;
+    uint8_t first_fault, fault_count; /* first: 1 ... 32 drive faults, 33 ... ecu faults */
     uint8_t refused_count;
-    uint32_t resets; /* granted, counted up */
 } supervisor_t;
 
 extern const transition_t supervisor_table[];

@@ -65,7 +65,7 @@ void columns_copy(capture_t *capture, int16_t *memory, const sample_t *next, uin
 static inline void columns_end(capture_t *capture)
 {
     if (columns_are_pending(capture)) {
-        hal_gather_start();
+        hal_gather_start(capture->parts);
     }
 }
 /** The next sample does not follow the last one, in the ring or in the memory. */

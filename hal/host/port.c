@@ -174,8 +174,9 @@ void hal_gather_add(uint32_t count, bool is_further)
     (void)is_further;
 }
 
-void hal_gather_start(void)
+void hal_gather_start(uint32_t parts)
 {
+    (void)parts;
 }
 
 void hal_watchdog_start(void)

@@ -11,7 +11,7 @@
 #include "hal/s32k144/registers.h"
 
 #define VALUE_SIZE 2U
-#define OTHER_BANK (HAL_GATHER_COLUMNS * (uint32_t)sizeof(channel_t))
+#define OTHER_BANK HAL_GATHER_COLUMNS
 #define LINK ((uint32_t)DMA_TCD0_CSR_MAJORELINK | DMA_TCD0_CSR_MAJORLINKCH_MASK)
 #define HALF_WORDS (DMA_TCD0_ATTR_SSIZE(1) | DMA_TCD0_ATTR_DSIZE(1))
 /* The registers of one channel. */
@@ -39,22 +39,20 @@ OFFSET(CSR, TCD0_CSR);
 OFFSET(BITER, TCD0_BITER_ELINKNO);
 _Static_assert(sizeof(channel_t) == offsetof(dma_t, TCD1_SADDR) - offsetof(dma_t, TCD0_SADDR), "channels");
 
-/* Of channels: distances in bytes from the first. */
 static struct {
-    uint16_t last;  /* of a bank: from its first channel */
-    uint16_t bank;  /* of the next part, or of the one that was added last */
-    uint16_t first; /* of the first part */
-    bool started;   /* since the set-up */
+    uint8_t last; /* channel of a bank */
+    uint8_t bank; /* its first channel: of the next part, or of the one that was added last */
+    bool started; /* since the set-up */
 } state;
 
-static inline channel_t *channel_at(uint32_t distance)
+static inline channel_t *channels(void)
 {
-    return (channel_t *)(void *)((uint8_t *)DMA + offsetof(dma_t, TCD0_SADDR) + distance);
+    return (channel_t *)(void *)&DMA->TCD0_SADDR;
 }
 
-static inline uint32_t link_to(uint32_t distance)
+static inline uint32_t link_to(uint32_t k)
 {
-    return DMA_TCD0_CSR_MAJORELINK | DMA_TCD0_CSR_MAJORLINKCH(distance / sizeof(channel_t));
+    return DMA_TCD0_CSR_MAJORELINK | DMA_TCD0_CSR_MAJORLINKCH(k);
 }
 
 /* The first store clears DONE: while that is set, a link is not accepted. */
@@ -66,13 +64,13 @@ static void set_status(channel_t *channel, uint32_t status)
 
 bool hal_gather_is_idle(void)
 {
-    return !state.started || (channel_at((uint32_t)state.bank + state.last)->CSR & DMA_TCD0_CSR_DONE) != 0U;
+    return !state.started || (channels()[state.bank + state.last].CSR & DMA_TCD0_CSR_DONE) != 0U;
 }
 
-static void set_up_channel(uint32_t distance, uint32_t stride, uint32_t row_size)
+static void set_up_channel(uint32_t k, uint32_t stride, uint32_t row_size)
 {
-    channel_t *channel = channel_at(distance);
-    set_status(channel, link_to(distance + (uint32_t)sizeof(channel_t)));
+    channel_t *channel = &channels()[k];
+    set_status(channel, link_to(k + 1U));
     channel->SOFF = (uint16_t)stride;
     channel->ATTR = HALF_WORDS;
     channel->SLAST = 0;
@@ -84,20 +82,20 @@ static void set_up_channel(uint32_t distance, uint32_t stride, uint32_t row_size
 
 void hal_gather_set_up(uint32_t columns, const uint32_t *stride, uint32_t row_size)
 {
-    state.last = (uint16_t)((columns - 1U) * sizeof(channel_t));
+    state.last = (uint8_t)(columns - 1U);
     state.started = false;
     for (uint32_t k = 0; k < columns; k++) {
-        set_up_channel(k * sizeof(channel_t), stride[k], row_size);
-        set_up_channel(OTHER_BANK + k * sizeof(channel_t), stride[k], row_size);
+        set_up_channel(k, stride[k], row_size);
+        set_up_channel(OTHER_BANK + k, stride[k], row_size);
     }
 }
 
 void hal_gather_move(uint32_t column, const void *from, int16_t *to)
 {
     if (column == 0U) {
-        state.bank ^= OTHER_BANK;
+        state.bank = (uint8_t)(state.bank ^ OTHER_BANK);
     }
-    channel_t *channel = channel_at(state.bank + column * sizeof(channel_t));
+    channel_t *channel = &channels()[state.bank + column];
     channel->SADDR = (uint32_t)(uintptr_t)from;
     channel->DADDR = (uint32_t)(uintptr_t)to;
 }
@@ -105,23 +103,21 @@ void hal_gather_move(uint32_t column, const void *from, int16_t *to)
 /* Also the channels that are not used get their number of bytes: that is shorter than counting them. */
 void hal_gather_add(uint32_t count, bool is_further)
 {
-    channel_t *channel = channel_at(state.bank);
-    FX_ADDRESS_ONCE(channel);
+    channel_t *bank = &channels()[state.bank];
+    FX_ADDRESS_ONCE(bank);
     FX_UNROLLED
     for (uint32_t k = 0; k < HAL_GATHER_COLUMNS; k++) {
-        channel[k].NBYTES = count * VALUE_SIZE;
+        bank[k].NBYTES = count * VALUE_SIZE;
     }
-    channel_at((uint32_t)state.bank + state.last)->CSR = 0; /* neither DONE nor a link */
+    bank[state.last].CSR = 0; /* neither DONE nor a link */
     if (is_further) {
-        channel_at((state.bank ^ OTHER_BANK) + state.last)->CSR = (uint16_t)link_to(state.bank);
-    } else {
-        state.first = state.bank;
+        channels()[(state.bank ^ OTHER_BANK) + state.last].CSR = (uint16_t)link_to(state.bank);
     }
 }
 
-void hal_gather_start(void)
+void hal_gather_start(uint32_t parts)
 {
-    channel_t *first = channel_at(state.first);
+    channel_t *first = &channels()[(parts > 1U) ? state.bank ^ OTHER_BANK : state.bank];
     state.started = true;
     set_status(first, (first->CSR & LINK) | DMA_TCD0_CSR_START);
 }

@@ -32,6 +32,7 @@ void hal_gather_add(uint32_t count, bool is_further)
 }
 
 /* Write: the start of the first channel. */
-void hal_gather_start(void)
+void hal_gather_start(uint32_t parts)
 {
+    (void)parts;
 }

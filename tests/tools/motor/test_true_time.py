@@ -104,7 +104,6 @@ COUNTS = {
     "MEAN_PERIODS": "periods of a mean of the simulation's own",
     "SCOPE_FREEZE_SAMPLES": "samples around a fault, as docs/howto/scope.md says",
     "SEARCHED_AT_ONCE": "samples between two branches; any number finds the same",
-    "ROWS_AT_ONCE": "rows that are copied without a branch; any number copies the same",
     "FIRST_PER_S": "a rate by the core's clock, before the task runs",
     "VELOCITY_TURNS_PER_S": "the unit in which the converter sends the speed",
     "FAST_ANGLE": "angle of a step, as that page says",

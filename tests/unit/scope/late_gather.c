@@ -115,10 +115,11 @@ void hal_gather_add(uint32_t count, bool is_further)
     late_gather.parts++;
 }
 
-void hal_gather_start(void)
+void hal_gather_start(uint32_t number)
 {
     expect_idle();
     TEST_ASSERT_TRUE(parts > 0U);
+    TEST_ASSERT_EQUAL_UINT32(parts, number);
     copying = true;
     late_gather.copies++;
 }
