@@ -263,6 +263,7 @@ typedef struct {
     request_t request;
     fast_state_t fast;
     volatile q15_t psi_d_error; /* fed forward: the fast ISR copies the robust identification's, else the MRAI ISR's */
+    volatile bool held; /* switching stays disabled while the background, which sets this flag, writes the flash */
     task_state_t task;
     window_box_t windows;
     command_box_t commands;
@@ -273,7 +274,6 @@ typedef struct {
     pulses_state_t pulses_state; /* written by the fast ISR alone */
     movement_frame_t frame;      /* of a movement: written by the 1 kHz task */
     movement_angle_t frame_angle;
-    volatile bool held;   /* switching stays disabled while the background, which sets this flag, writes the flash */
     sample_box_t samples; /* last: the offset of a member behind its slots would not fit a load instruction */
 } drive_t;
 
