@@ -53,16 +53,18 @@ def library(parts: Parts) -> ctypes.CDLL:
 
 @pytest.fixture(scope="session")
 def program(here: Path, tmp_path_factory: pytest.TempPathFactory, parts: Parts) -> Program:
-    """A function that compiles programs/<name>.c with additional flags, its data at these addresses; returns the ELF
-    file."""
+    """A function that compiles programs/<name>.c with additional flags, and perhaps another source file, its data at
+    these addresses; returns the ELF file."""
     folder = tmp_path_factory.mktemp("programs")
 
-    def compiled(name: str, *flags: str, data: int = 0x1FFF_8800, bss: int = 0x1FFF_8000) -> Path:
-        elf = folder / f"{name}{''.join(flags)}.elf"
-        source = here / "programs" / f"{name}.c"
+    def compiled(
+        name: str, *flags: str, data: int = 0x1FFF_8800, bss: int = 0x1FFF_8000, also: Path | None = None
+    ) -> Path:
+        sources = [here / "programs" / f"{name}.c", *([also] if also else [])]
+        elf = folder / f"{'-'.join([source.stem for source in sources])}{''.join(flags).replace('/', '-')}.elf"
         options = ("-std=gnu11", "-O2", "-Wall", "-Werror", *flags)
         places = f"-Wl,-Tbss={bss:#x},-Tdata={data:#x}"
-        command = [ARM_CC, *ARM_FLAGS, *options, str(source), *LINK, places, "-o", str(elf)]
+        command = [ARM_CC, *ARM_FLAGS, *options, *map(str, sources), *LINK, places, "-o", str(elf)]
         subprocess.run(command, check=True, capture_output=True)
         return elf
 
