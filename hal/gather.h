@@ -8,8 +8,8 @@
  *   A port without such hardware never reports that it is idle: the scope then copies by itself (scope/columns.c).
  * Source   docs/howto/port.md, docs/decisions/020-scope.md
  * Units    bytes, values
- * Range    1 ... HAL_GATHER_COLUMNS columns; more than one value in a part only if both distances are at most 32767
- *          bytes
+ * Range    1 ... HAL_GATHER_COLUMNS columns; with a distance above 32767 bytes each part has one value, and its columns
+ *          are moved
  * Errors   a copy that does not end: hal_gather_is_idle() stays false
  * Context  1 kHz task; all others only while idle */
 #include <stdbool.h>
@@ -18,7 +18,7 @@
 #define HAL_GATHER_COLUMNS 8U
 #define HAL_GATHER_PARTS 2U
 
-/** Nothing is being copied, and the port is able to copy. */
+/** Nothing is being copied, and the port is able to copy; not between a move or an addition and its start. */
 bool hal_gather_is_idle(void);
 /** Number of columns, and bytes from one row to the next; stride: of each column, the bytes from one half word to the
  * next, 0: it is always the same. All columns must be moved before the next part. */

@@ -259,29 +259,32 @@ class PlantedError:
 IDLE_AT_ONCE, NEVER_IDLE, DIFFERS = "idle immediately after", "never idle again", "the memory differs"
 TOO_EARLY, REFUSED = "idle too early", "DMA channel 8 starts: NBYTES"
 START = "set_status(first, (first->CSR & LINK) | DMA_TCD0_CSR_START)"
-STATUS = "set_status(channel, link_to(distance + (uint32_t)sizeof(channel_t)))"
-CLEARED = "channel_at((uint32_t)state.bank + state.last)->CSR = 0;"
-FURTHER = "->CSR = (uint16_t)link_to(state.bank)"
+STATUS = "set_status(channel, link_to(k + 1U))"
+CLEARED = "bank[state.last].CSR = 0;"
+FURTHER = ".CSR = (uint16_t)link_to(state.bank)"
+FIRST = "(parts > 1U) ? state.bank ^ OTHER_BANK : state.bank"
+LAST = "channels()[state.bank + state.last].CSR & DMA"
 PLANTED = (
     PlantedError("DONE not cleared in start", START,
                  "first->CSR = (uint16_t)((first->CSR & LINK) | DMA_TCD0_CSR_START)", NEVER_IDLE),
     PlantedError("DONE not cleared in the set-up", STATUS,
-                 "channel->CSR = (uint16_t)link_to(distance + (uint32_t)sizeof(channel_t))", NEVER_IDLE),
+                 "channel->CSR = (uint16_t)link_to(k + 1U)", NEVER_IDLE),
     PlantedError("DONE never cleared", "    channel->CSR = 0;\n", "", NEVER_IDLE),
     PlantedError("last status not cleared", CLEARED, "", DIFFERS),
     PlantedError("last status cleared only of a link", CLEARED,
-                 "if ((channel_at((uint32_t)state.bank + state.last)->CSR & DMA_TCD0_CSR_DONE) == 0U) {\n"
-                 "        channel_at((uint32_t)state.bank + state.last)->CSR = 0;\n    }", IDLE_AT_ONCE),
-    PlantedError("no link to the further part", FURTHER, "->CSR = 0", NEVER_IDLE),
-    PlantedError("a link to the first part again", FURTHER, "->CSR = (uint16_t)link_to(state.first)", NEVER_IDLE),
-    PlantedError("starts the other bank", "state.first = state.bank;", "state.first = state.bank ^ OTHER_BANK;",
+                 "if ((bank[state.last].CSR & DMA_TCD0_CSR_DONE) == 0U) {\n        bank[state.last].CSR = 0;\n    }",
+                 IDLE_AT_ONCE),
+    PlantedError("no link to the further part", FURTHER, ".CSR = 0", NEVER_IDLE),
+    PlantedError("a link to the first part again", FURTHER, ".CSR = (uint16_t)link_to(state.bank ^ OTHER_BANK)",
                  NEVER_IDLE),
-    PlantedError("adds to the other bank", "channel_t *channel = channel_at(state.bank);",
-                 "channel_t *channel = channel_at(state.bank ^ OTHER_BANK);", DIFFERS),
-    PlantedError("links from the bank itself", "channel_at((state.bank ^ OTHER_BANK) + state.last)",
-                 "channel_at((uint32_t)state.bank + state.last)", NEVER_IDLE),
-    PlantedError("moves without another bank", "state.bank ^= OTHER_BANK;", "", DIFFERS),
-    PlantedError("first bank stays", "state.first = state.bank;", "state.first = 0;", NEVER_IDLE),
+    PlantedError("starts the other bank", FIRST, "(parts > 1U) ? state.bank : state.bank ^ OTHER_BANK", NEVER_IDLE),
+    PlantedError("adds to the other bank", "channel_t *bank = &channels()[state.bank];",
+                 "channel_t *bank = &channels()[state.bank ^ OTHER_BANK];", DIFFERS),
+    PlantedError("links from the bank itself", "channels()[(state.bank ^ OTHER_BANK) + state.last]",
+                 "channels()[state.bank + state.last]", NEVER_IDLE),
+    PlantedError("moves without another bank", "state.bank = (uint8_t)(state.bank ^ OTHER_BANK);", "", DIFFERS),
+    PlantedError("starts the first bank always", FIRST, "0U", NEVER_IDLE),
+    PlantedError("starts the last part only", FIRST, "state.bank", DIFFERS),
     PlantedError("values instead of bytes", "count * VALUE_SIZE", "count", REFUSED),
     PlantedError("bytes of one value too many", "count * VALUE_SIZE", "(count + 1U) * VALUE_SIZE", DIFFERS),
     PlantedError("no offset of the source", "    channel->SOFF = (uint16_t)stride;\n", "", DIFFERS),
@@ -289,14 +292,11 @@ PLANTED = (
     PlantedError("constant offset of the destination", "(uint16_t)row_size", "VALUE_SIZE", DIFFERS),
     PlantedError("never started", "state.started = true;", "", IDLE_AT_ONCE),
     PlantedError("started before the set-up", "    state.started = false;\n", "", "not idle after the set-up"),
-    PlantedError("idle after the first column", "channel_at((uint32_t)state.bank + state.last)->CSR & DMA",
-                 "channel_at((uint32_t)state.bank)->CSR & DMA", TOO_EARLY),
-    PlantedError("idle after the first part", "channel_at((uint32_t)state.bank + state.last)->CSR & DMA",
-                 "channel_at((uint32_t)state.first + state.last)->CSR & DMA", TOO_EARLY),
-    PlantedError("last column left out", "(columns - 1U) * sizeof", "(columns - 2U + (columns < 2U)) * sizeof",
-                 DIFFERS),
+    PlantedError("idle after the first column", LAST, "channels()[state.bank].CSR & DMA", TOO_EARLY),
+    PlantedError("looks at the first bank only", LAST, "channels()[state.last].CSR & DMA", NEVER_IDLE),
+    PlantedError("last column left out", "(columns - 1U)", "(columns - 2U + (columns < 2U))", DIFFERS),
     PlantedError("second bank not set up",
-                 "        set_up_channel(OTHER_BANK + k * sizeof(channel_t), stride[k], row_size);\n", "", NEVER_IDLE),
+                 "        set_up_channel(OTHER_BANK + k, stride[k], row_size);\n", "", NEVER_IDLE),
 )  # fmt: skip
 
 

@@ -33,8 +33,10 @@ static void set_up(uint32_t columns, uint32_t row_size)
     idle_after_set_up = hal_gather_is_idle();
 }
 
-static void follow_script(void)
+/* The number of parts. */
+static uint32_t follow_script(void)
 {
+    uint32_t parts = 0;
     for (const volatile step_t *step = script; step->call != END; step++) {
         if (step->call == SET_UP) {
             set_up(step->a, step->b);
@@ -42,14 +44,16 @@ static void follow_script(void)
             hal_gather_move(step->a, (const void *)step->b, (int16_t *)step->c);
         } else {
             hal_gather_add(step->a, step->b != 0U);
+            parts++;
         }
     }
+    return parts;
 }
 
-static void copy(void)
+static void copy(uint32_t parts)
 {
     const uint32_t before = DWT_CYCCNT;
-    hal_gather_start();
+    hal_gather_start(parts);
     idle_after_start = hal_gather_is_idle();
     started = asked;
     while (!hal_gather_is_idle()) {
@@ -69,8 +73,7 @@ __attribute__((used)) void reset(void)
         while (asked == ended) {
         }
         idle_before = idle_after_set_up = hal_gather_is_idle();
-        follow_script();
-        copy();
+        copy(follow_script());
         ended = asked;
     }
 }
