@@ -43,11 +43,11 @@ typedef enum {
     TRIGGERS = 6
 } capture_trigger_t;
 
-/** What a step has to do. */
+/** What a step has to do. A single changed bit makes none of them another one. */
 typedef enum {
     CAPTURE_RECORDS_NOT = 0,
-    CAPTURE_RECORDS = 1, /* armed or triggered */
-    CAPTURE_ENDS = 2     /* triggered; the hardware copies the last samples */
+    CAPTURE_RECORDS = 3, /* armed or triggered */
+    CAPTURE_ENDS = 12    /* triggered; the hardware copies the last samples */
 } capture_recording_t;
 
 /** What an armed capture waits for in its next samples. */

@@ -577,6 +577,16 @@ void test_a_value_of_the_step_changes_with_the_step(void)
     TEST_ASSERT_EQUAL_INT16(7, sample(1, 25));
 }
 
+void test_a_changed_bit_does_not_make_an_idle_capture_record(void)
+{
+    for (unsigned bit = 0; bit < 8U; bit++) {
+        capture.recording = (uint8_t)(1U << bit);
+        run_steps(3);
+        TEST_ASSERT_EQUAL(CAPTURE_IDLE, capture.state);
+        TEST_ASSERT_EQUAL_UINT32(0, capture.next);
+    }
+}
+
 void test_nothing_is_recorded_when_idle_or_done(void)
 {
     run_steps(3);
