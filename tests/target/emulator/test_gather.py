@@ -293,7 +293,7 @@ PLANTED = (
     PlantedError("never started", "state.started = true;", "", IDLE_AT_ONCE),
     PlantedError("started before the set-up", "    state.started = false;\n", "", "not idle after the set-up"),
     PlantedError("idle after the first column", LAST, "channels()[state.bank].CSR & DMA", TOO_EARLY),
-    PlantedError("looks at the first bank only", LAST, "channels()[state.last].CSR & DMA", NEVER_IDLE),
+    PlantedError("reads the first bank only", LAST, "channels()[state.last].CSR & DMA", NEVER_IDLE),
     PlantedError("last column left out", "(columns - 1U)", "(columns - 2U + (columns < 2U))", DIFFERS),
     PlantedError("second bank not set up",
                  "        set_up_channel(OTHER_BANK + k, stride[k], row_size);\n", "", NEVER_IDLE),
