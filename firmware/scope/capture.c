@@ -5,7 +5,7 @@
 #include "scope/columns.h"
 #include "scope/trigger.h"
 
-#define USABLE (SAMPLE_SLOTS - 4U) /* the fast ISR may complete 4 periods while a step copies */
+#define USABLE (SAMPLE_SLOTS - 4U) /* the fast ISR may complete 4 periods until a step's samples have been copied */
 
 bool capture_config_is_valid(const capture_config_t *config)
 {
@@ -77,7 +77,8 @@ static FX_NOT_INLINED FX_COLD void begin_after(capture_t *capture)
     capture->before = (uint16_t)before;
     capture->remaining = (uint16_t)(config->samples - before);
     capture->taken = config->samples;
-    capture->first = (uint16_t)((capture->at + config->samples - before) % config->samples);
+    const uint32_t first = capture->at - before + ((capture->at < before) ? config->samples : 0U);
+    capture->first = (uint16_t)((first == config->samples) ? 0U : first);
     capture->trigger_period = capture->next;
 }
 
@@ -105,7 +106,10 @@ static void take(capture_t *capture, int16_t *memory, const sample_t *next, uint
 static FX_NOT_INLINED FX_COLD void end(capture_t *capture)
 {
     if (columns_are_pending(capture)) {
-        capture->recording = CAPTURE_ENDS;
+        if (capture->recording == (uint8_t)CAPTURE_RECORDS) {
+            capture->recording = CAPTURE_ENDS;
+            capture->next -= capture->config.divisor; /* a period that has passed: the next step comes here, too */
+        }
     } else {
         capture->recording = CAPTURE_RECORDS_NOT;
         capture->state = CAPTURE_DONE;

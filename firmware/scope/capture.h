@@ -9,7 +9,7 @@
  * Units    raw half words, scope/signal_list.h
  * Range    capture_config_is_valid()
  * Errors   a task that comes so late that the ring has lost periods: the search begins anew, or the capture ends early;
- *          both are counted in `lost`
+ *          both are counted in `lost`, and so is a copy of the port's hardware that did not end: its samples are wrong
  * Context  1 kHz task; the fast ISR may write other slots of the ring meanwhile */
 #include "scope/capture_state.h"
 
@@ -22,8 +22,7 @@ void capture_freeze(capture_t *capture, const capture_config_t *config, uint32_t
 void capture_trigger(capture_t *capture, uint32_t period);
 /** Releases the memory. */
 void capture_stop(capture_t *capture);
-/** Copies the periods that have come since the last step. The memory begins at a word. slot: the ring; newest: its
- * newest period. */
+/** Copies the periods that have come since the last step. slot: the ring; newest: its newest period. */
 void capture_step(capture_t *capture, int16_t *memory, const sample_t *slot, uint32_t newest);
 
 #endif

@@ -59,12 +59,13 @@ typedef enum {
 
 #define GATHER_CLOSED 0xFFU
 
-/** How far the port's hardware that copies (hal/gather.h) is prepared. */
+/** How far the port's hardware that copies (hal/gather.h) is prepared. A single changed bit makes none of them another
+ * one; any other value is as the first. */
 typedef enum {
     GATHER_NEVER = 0,      /* not in this capture: it failed, or a step may write the small memory twice */
-    GATHER_NOT_SET_UP = 1, /* for this capture */
-    GATHER_SET_UP = 2,
-    GATHER_CONTINUES = 3 /* where the next sample lies */
+    GATHER_NOT_SET_UP = 3, /* for this capture */
+    GATHER_SET_UP = 5,
+    GATHER_CONTINUES = 6 /* where the next sample lies */
 } capture_gather_t;
 
 typedef struct {

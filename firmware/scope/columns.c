@@ -107,11 +107,12 @@ static void move(const capture_t *capture, int16_t *first, const sample_t *next)
 /* False: the processor must copy. */
 static FX_NOT_INLINED bool prepare(capture_t *capture, int16_t *memory, const sample_t *next)
 {
-    if (capture->gather == GATHER_NEVER) {
-        return false;
-    }
-    if (capture->gather == GATHER_NOT_SET_UP) {
+    if (capture->gather == (uint8_t)GATHER_NOT_SET_UP) {
         set_up_columns(capture);
+        capture->gather = GATHER_SET_UP;
+    }
+    if (capture->gather != (uint8_t)GATHER_SET_UP && capture->gather != (uint8_t)GATHER_CONTINUES) {
+        return false;
     }
     move(capture, row(capture, memory), next);
     capture->gather = GATHER_CONTINUES;

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef SCOPE_COLUMNS_H
 #define SCOPE_COLUMNS_H
-/** Where a captured signal is found: one column of the ring's slots, or a value of the task's step.
+/** Where a captured signal is found, one column of the ring's slots or a value of the task's step, and how it is copied.
  * Source   the list in scope/signal_list.h
  * Units    raw half words, scope/signal_list.h
  * Range    signals below CAPTURE_SIGNALS
- * Errors   none
+ * Errors   a copy that did not end is counted in `lost`
  * Context  1 kHz task; the fast ISR may write other slots of the ring meanwhile */
 #include <stddef.h>
 
@@ -41,8 +41,8 @@ static inline size_t stride_of(const capture_t *capture)
 void columns_find(capture_t *capture);
 /** The trigger's signal. */
 column_t column_of_trigger(const capture_t *capture, const sample_t *next);
-/** The port has no hardware (hal/gather.h), or a copy of the last step has not ended: this is counted, and this capture
- * uses the hardware no more. */
+/** The port has no hardware (hal/gather.h), or a copy of the last step has not ended: this is counted, and the hardware
+ * is not used again until it is idle, in this capture not at all. */
 void columns_refuse(capture_t *capture);
 /** Before the first copy of a step. */
 static inline void columns_begin(capture_t *capture)
@@ -56,7 +56,7 @@ static inline void columns_begin(capture_t *capture)
 /** The hardware copies samples of this step. */
 static inline bool columns_are_pending(const capture_t *capture)
 {
-    return capture->parts - 1U < HAL_GATHER_PARTS;
+    return capture->parts != 0U && capture->parts <= HAL_GATHER_PARTS;
 }
 /** Copies `count` samples, at least one, of all captured signals, from the next period on; they are contiguous in the
  * ring and in the memory. */

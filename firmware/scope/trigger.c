@@ -126,7 +126,7 @@ static capture_search_t search_of(const capture_t *capture)
     return (config->divisor == 1U) ? SEARCH_PERIODS : SEARCH_LEVEL;
 }
 
-/* Not inlined: the usual search needs fewer registers. */
+/* Not inlined: the search for a level needs fewer registers. */
 static FX_NOT_INLINED uint32_t search_any(capture_t *capture, const sample_t *next, uint32_t count)
 {
     const condition_t reached = condition(capture, column_of_trigger(capture, next));

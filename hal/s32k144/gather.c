@@ -67,10 +67,10 @@ bool hal_gather_is_idle(void)
     return !state.started || (channels()[state.bank + state.last].CSR & DMA_TCD0_CSR_DONE) != 0U;
 }
 
-static void set_up_channel(uint32_t k, uint32_t stride, uint32_t row_size)
+static void set_up_channel(uint32_t k, uint32_t link, uint32_t stride, uint32_t row_size)
 {
     channel_t *channel = &channels()[k];
-    set_status(channel, link_to(k + 1U));
+    set_status(channel, link);
     channel->SOFF = (uint16_t)stride;
     channel->ATTR = HALF_WORDS;
     channel->SLAST = 0;
@@ -85,8 +85,9 @@ void hal_gather_set_up(uint32_t columns, const uint32_t *stride, uint32_t row_si
     state.last = (uint8_t)(columns - 1U);
     state.started = false;
     for (uint32_t k = 0; k < columns; k++) {
-        set_up_channel(k, stride[k], row_size);
-        set_up_channel(OTHER_BANK + k, stride[k], row_size);
+        const bool is_last = k + 1U == columns;
+        set_up_channel(k, is_last ? 0U : link_to(k + 1U), stride[k], row_size);
+        set_up_channel(OTHER_BANK + k, is_last ? 0U : link_to(OTHER_BANK + k + 1U), stride[k], row_size);
     }
 }
 
@@ -119,5 +120,6 @@ void hal_gather_start(uint32_t parts)
 {
     channel_t *first = &channels()[(parts > 1U) ? state.bank ^ OTHER_BANK : state.bank];
     state.started = true;
+    __asm__ volatile("dmb" ::: "memory"); /* the DMA reads what the task has stored before */
     set_status(first, (first->CSR & LINK) | DMA_TCD0_CSR_START);
 }

@@ -259,7 +259,7 @@ class PlantedError:
 IDLE_AT_ONCE, NEVER_IDLE, DIFFERS = "idle immediately after", "never idle again", "the memory differs"
 TOO_EARLY, REFUSED = "idle too early", "DMA channel 8 starts: NBYTES"
 START = "set_status(first, (first->CSR & LINK) | DMA_TCD0_CSR_START)"
-STATUS = "set_status(channel, link_to(k + 1U))"
+STATUS = "set_status(channel, link)"
 CLEARED = "bank[state.last].CSR = 0;"
 FURTHER = ".CSR = (uint16_t)link_to(state.bank)"
 FIRST = "(parts > 1U) ? state.bank ^ OTHER_BANK : state.bank"
@@ -268,9 +268,9 @@ PLANTED = (
     PlantedError("DONE not cleared in start", START,
                  "first->CSR = (uint16_t)((first->CSR & LINK) | DMA_TCD0_CSR_START)", NEVER_IDLE),
     PlantedError("DONE not cleared in the set-up", STATUS,
-                 "channel->CSR = (uint16_t)link_to(k + 1U)", NEVER_IDLE),
+                 "channel->CSR = (uint16_t)link", NEVER_IDLE),
     PlantedError("DONE never cleared", "    channel->CSR = 0;\n", "", NEVER_IDLE),
-    PlantedError("last status not cleared", CLEARED, "", DIFFERS),
+    PlantedError("last status not cleared", CLEARED, "", IDLE_AT_ONCE),
     PlantedError("last status cleared only of a link", CLEARED,
                  "if ((bank[state.last].CSR & DMA_TCD0_CSR_DONE) == 0U) {\n        bank[state.last].CSR = 0;\n    }",
                  IDLE_AT_ONCE),
@@ -296,7 +296,8 @@ PLANTED = (
     PlantedError("reads the first bank only", LAST, "channels()[state.last].CSR & DMA", NEVER_IDLE),
     PlantedError("last column left out", "(columns - 1U)", "(columns - 2U + (columns < 2U))", DIFFERS),
     PlantedError("second bank not set up",
-                 "        set_up_channel(OTHER_BANK + k, stride[k], row_size);\n", "", NEVER_IDLE),
+                 "        set_up_channel(OTHER_BANK + k, is_last ? 0U : link_to(OTHER_BANK + k + 1U), stride[k], row_size);\n",
+                 "", NEVER_IDLE),
 )  # fmt: skip
 
 

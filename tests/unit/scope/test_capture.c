@@ -13,7 +13,7 @@
 #define NEVER 30000
 
 static sample_t ring[SAMPLE_SLOTS];
-static _Alignas(int32_t) int16_t memory[CAPTURE_MEMORY];
+static int16_t memory[CAPTURE_MEMORY];
 static int16_t written[PERIODS]; /* i_q of each period */
 static uint32_t newest, offset;  /* of the periods' numbers */
 static capture_t capture;
@@ -497,6 +497,49 @@ void test_hardware_that_does_not_end_is_not_used_again(void)
     TEST_ASSERT_EQUAL_UINT32(4, late_gather.copies);
     TEST_ASSERT_EQUAL_UINT16(1, capture.lost);
     expect_periods();
+}
+
+/* One step later, whatever the divisor is, and also if the periods stop. */
+void test_a_capture_is_done_one_step_after_its_last_copy(void)
+{
+    const uint16_t divisors[] = {1, 10, 100, 300};
+    for (unsigned k = 0; k < sizeof divisors / sizeof divisors[0]; k++) {
+        setUp();
+        late_gather_reset(true);
+        config.divisor = divisors[k];
+        config.samples = SAMPLE_SLOTS;
+        config.before = 0;
+        config.signals = 1;
+        arm_for(TRIGGER_MANUAL, 0);
+        capture_trigger(&capture, newest + 1);
+        while (capture.recording == CAPTURE_RECORDS && newest + STEP < UINT16_MAX) {
+            newest += STEP;
+            step();
+        }
+        TEST_ASSERT_EQUAL(CAPTURE_TRIGGERED, capture.state);
+        step();
+        TEST_ASSERT_EQUAL(CAPTURE_DONE, capture.state);
+    }
+}
+
+/* A changed bit leaves the hardware unused, or moves it: it never starts columns that have not been set up. */
+void test_a_changed_bit_starts_no_hardware_that_is_not_set_up(void)
+{
+    for (unsigned bit = 0; bit < 8U; bit++) {
+        setUp();
+        late_gather_reset(true);
+        config.samples = 40;
+        arm_for(TRIGGER_MANUAL, 0);
+        capture.gather ^= (uint8_t)(1U << bit);
+        run_steps(4);
+        TEST_ASSERT_TRUE(late_gather.copies == 0U || late_gather.set_ups > 0U);
+        config.samples = 100;
+        arm();
+        capture.gather ^= (uint8_t)(1U << bit);
+        const uint32_t before = late_gather.set_ups, copied = late_gather.copies;
+        run_steps(4);
+        TEST_ASSERT_TRUE(late_gather.copies == copied || late_gather.set_ups > before);
+    }
 }
 
 /* A tool that finds the state done reads samples that are there. */

@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "late_gather.h"
 #include "unity.h"
 
 #define COMMAND(...) command((const uint8_t[]){__VA_ARGS__}, sizeof((const uint8_t[]){__VA_ARGS__}))
@@ -37,6 +38,7 @@ static void step(void)
     const bool changed = is_fault != was_fault;
     was_fault = is_fault;
     scope_step(&scope, &drive, changed, is_fault);
+    late_gather_end(); /* the hardware has copied nothing before */
 }
 
 static void run_steps(uint32_t steps)
@@ -84,6 +86,7 @@ void setUp(void)
     memset(&drive, 0, sizeof drive);
     memset(&scope, 0, sizeof scope);
     ecu_fault = was_fault = false;
+    late_gather_reset(GATHER);
     run(7);
 }
 
@@ -191,7 +194,7 @@ void test_a_fault_leaves_a_freeze_frame_of_32_periods_on_both_sides(void)
     run(6);
     step();
     TEST_ASSERT_EQUAL(CAPTURE_TRIGGERED, scope.capture.state);
-    run_steps(3);
+    run_steps(4);
     TEST_ASSERT_EQUAL_UINT8(1, scope.capture.frozen);
     TEST_ASSERT_EQUAL_UINT16(64, scope.capture.taken);
     TEST_ASSERT_EQUAL_UINT8(8, scope.capture.config.signals);
@@ -215,7 +218,7 @@ void test_a_fault_outside_the_drive_is_dated_to_its_step(void)
 {
     run_steps(20);
     ecu_fault = true;
-    run_steps(5);
+    run_steps(6);
     expect_trigger(217, 32);
 }
 
