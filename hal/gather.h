@@ -18,8 +18,8 @@
 #define HAL_GATHER_COLUMNS 8U
 #define HAL_GATHER_PARTS 2U
 
-/** Nothing is being copied, and the port is able to copy. Must not be called between a move or an addition and the start
- * that follows. */
+/** Nothing is being copied, and the port is able to copy. Must not be called between a move or an addition and the
+ * start that follows. */
 bool hal_gather_is_idle(void);
 /** Number of columns, and bytes from one row to the next; stride: of each column, the bytes from one half word to the
  * next, 0: it is always the same. All columns must be moved before the next part. */

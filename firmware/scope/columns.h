@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef SCOPE_COLUMNS_H
 #define SCOPE_COLUMNS_H
-/** Where a captured signal is found, one column of the ring's slots or a value of the task's step, and how it is copied.
+/** Where a captured signal is found, a column of the ring's slots or a value of the task's step, and how it is copied.
  * Source   the list in scope/signal_list.h
  * Units    raw half words, scope/signal_list.h
  * Range    signals below CAPTURE_SIGNALS

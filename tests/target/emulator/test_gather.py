@@ -262,6 +262,8 @@ START = "set_status(first, (first->CSR & LINK) | DMA_TCD0_CSR_START)"
 STATUS = "set_status(channel, link)"
 CLEARED = "bank[state.last].CSR = 0;"
 FURTHER = ".CSR = (uint16_t)link_to(state.bank)"
+SECOND_BANK = """
+        set_up_channel(OTHER_BANK + k, is_last ? 0U : link_to(OTHER_BANK + k + 1U), stride[k], row_size);"""
 FIRST = "(parts > 1U) ? state.bank ^ OTHER_BANK : state.bank"
 LAST = "channels()[state.bank + state.last].CSR & DMA"
 PLANTED = (
@@ -295,9 +297,7 @@ PLANTED = (
     PlantedError("idle after the first column", LAST, "channels()[state.bank].CSR & DMA", TOO_EARLY),
     PlantedError("reads the first bank only", LAST, "channels()[state.last].CSR & DMA", NEVER_IDLE),
     PlantedError("last column left out", "(columns - 1U)", "(columns - 2U + (columns < 2U))", DIFFERS),
-    PlantedError("second bank not set up",
-                 "        set_up_channel(OTHER_BANK + k, is_last ? 0U : link_to(OTHER_BANK + k + 1U), stride[k], row_size);\n",
-                 "", NEVER_IDLE),
+    PlantedError("second bank not set up", SECOND_BANK, "", NEVER_IDLE),
 )  # fmt: skip
 
 
