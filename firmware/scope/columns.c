@@ -123,10 +123,9 @@ static FX_NOT_INLINED bool prepare(capture_t *capture, int16_t *memory, const sa
 static bool gather(capture_t *capture, int16_t *memory, const sample_t *next, uint32_t count)
 {
     const bool is_further = capture->parts != 0U;
-    if (capture->gather != GATHER_CONTINUES || is_further) {
-        if (!prepare(capture, memory, next)) {
-            return false;
-        }
+    const bool is_moved = capture->gather != GATHER_CONTINUES || is_further;
+    if (is_moved && !prepare(capture, memory, next)) {
+        return false;
     }
     hal_gather_add(count, is_further);
     capture->parts++;
