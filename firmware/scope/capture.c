@@ -77,8 +77,7 @@ static FX_NOT_INLINED FX_COLD void begin_after(capture_t *capture)
     capture->before = (uint16_t)before;
     capture->remaining = (uint16_t)(config->samples - before);
     capture->taken = config->samples;
-    const uint32_t first = capture->at - before + ((capture->at < before) ? config->samples : 0U);
-    capture->first = (uint16_t)((first == config->samples) ? 0U : first);
+    capture->first = (uint16_t)(capture->at - before + ((capture->at < before) ? config->samples : 0U));
     capture->trigger_period = capture->next;
 }
 
