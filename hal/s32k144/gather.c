@@ -14,6 +14,7 @@
 #define OTHER_BANK HAL_GATHER_COLUMNS
 #define LINK ((uint32_t)DMA_TCD0_CSR_MAJORELINK | DMA_TCD0_CSR_MAJORLINKCH_MASK)
 #define HALF_WORDS (DMA_TCD0_ATTR_SSIZE(1) | DMA_TCD0_ATTR_DSIZE(1))
+
 /* The registers of one channel. */
 typedef struct {
     volatile uint32_t SADDR;
