@@ -53,8 +53,9 @@ typedef enum {
 /** What an armed capture waits for in its next samples. */
 typedef enum {
     SEARCH_ANY = 0,
-    SEARCH_PERIODS = 1, /* nothing but a level, in the samples of every period */
-    SEARCH_LEVEL = 2    /* the same with a divisor */
+    SEARCH_PERIODS = 1, /* nothing but a level, or one side of it before an edge, in the samples of every period */
+    SEARCH_SAMPLES = 2, /* the same with a divisor */
+    SEARCH_STEP = 3     /* the same in a value of the step */
 } capture_search_t;
 
 #define GATHER_CLOSED 0xFFU
@@ -94,13 +95,13 @@ typedef struct {
     scope_step_values_t coming; /* of the last command: those of the periods copied next */
     uint32_t next;              /* period of the next sample */
     uint32_t asked_for;         /* period in which a command or a fault triggers */
-    int32_t trigger_offset;     /* the trigger is reached where sign * value + offset >= 0 */
+    int32_t awaited_offset;     /* the search ends where sign * value + offset >= 0 */
     uint16_t at;                /* row of the next sample; `samples`: the first */
     uint16_t run;               /* samples from it on that lie side by side in the ring and in the memory; 0: unknown */
     uint16_t filled;            /* samples since the arming, at most `samples` */
     uint16_t remaining;         /* samples until the end */
     uint8_t trigger_place;      /* of the trigger's signal: of the step from sizeof(sample_t) on */
-    int8_t trigger_sign;        /* 1, or -1: triggers downwards */
+    int8_t awaited_sign;        /* 1, or -1: downwards */
     bool uses_step;             /* one of the signals, or the trigger's, is a value of the step */
     uint8_t recording;          /* capture_recording_t */
     uint8_t gather;             /* capture_gather_t */

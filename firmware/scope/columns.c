@@ -4,9 +4,6 @@
 #include "fx/codegen.h"
 #include "hal/gather.h"
 
-#define FROM_STEP sizeof(sample_t)
-
-/* Places below FROM_STEP are in the period's sample, the others in the values of the step. */
 #define PERIOD(field) offsetof(sample_t, field)
 #define UPPER(field) (offsetof(sample_t, field) + sizeof(int16_t))
 #define STEP(field) (FROM_STEP + offsetof(scope_step_values_t, field))
@@ -18,15 +15,10 @@ _Static_assert(FROM_STEP + sizeof(scope_step_values_t) <= UINT8_MAX, "a place is
 _Static_assert(CAPTURE_SIGNALS_MAX <= HAL_GATHER_COLUMNS, "a column of the hardware for each signal");
 _Static_assert(SAMPLE_SLOTS * sizeof(sample_t) <= INT16_MAX, "several rows in the ring have such a distance");
 
-static bool is_of_step(uint8_t place)
-{
-    return place >= FROM_STEP;
-}
-
 static column_t column_at(const capture_t *capture, uint8_t place, const sample_t *next)
 {
     if (is_of_step(place)) {
-        return (column_t){(const uint8_t *)&capture->values + (place - FROM_STEP), 0};
+        return column_of_step(capture, place);
     }
     return (column_t){(const uint8_t *)next + place, stride_of(capture)};
 }

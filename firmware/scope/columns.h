@@ -37,6 +37,19 @@ static inline size_t stride_of(const capture_t *capture)
     return capture->config.divisor * sizeof(sample_t);
 }
 
+/** A signal's place, a byte, is in the period's sample if it is smaller, otherwise in the values of the step. */
+#define FROM_STEP sizeof(sample_t)
+
+static inline bool is_of_step(uint8_t place)
+{
+    return place >= FROM_STEP;
+}
+
+static inline column_t column_of_step(const capture_t *capture, uint8_t place)
+{
+    return (column_t){(const uint8_t *)&capture->values + (place - FROM_STEP), 0};
+}
+
 /** What is the same during a whole capture: once, when it begins. */
 void columns_find(capture_t *capture);
 /** The trigger's signal. */

@@ -14,25 +14,30 @@ static bool is_edge(const capture_t *capture)
     return capture->config.trigger == TRIGGER_RISING || capture->config.trigger == TRIGGER_FALLING;
 }
 
+/* Before an edge, the other side of the level is waited for first: x < 0 is the same as -x - 1 >= 0. */
+static void set_ready(capture_t *capture, bool ready)
+{
+    if (ready != capture->ready) {
+        capture->ready = ready;
+        capture->awaited_sign = (int8_t)-capture->awaited_sign;
+        capture->awaited_offset = -capture->awaited_offset - 1;
+    }
+}
+
 void trigger_reset(capture_t *capture)
 {
     const capture_config_t *config = &capture->config;
     const bool downwards = config->trigger == TRIGGER_FALLING || config->trigger == TRIGGER_BELOW;
-    capture->trigger_sign = downwards ? -1 : 1;
-    capture->trigger_offset = downwards ? config->level : -config->level;
-    capture->ready = !is_edge(capture);
+    capture->awaited_sign = downwards ? -1 : 1;
+    capture->awaited_offset = downwards ? config->level : -config->level;
+    capture->ready = true;
+    set_ready(capture, !is_edge(capture));
     capture->search = SEARCH_ANY;
 }
 
-static condition_t condition(const capture_t *capture, column_t values)
+static inline condition_t awaited(const capture_t *capture, column_t values)
 {
-    return (condition_t){values, capture->trigger_sign, capture->trigger_offset};
-}
-
-/* x < 0 is the same as -x - 1 >= 0. */
-static condition_t negated(const condition_t *condition)
-{
-    return (condition_t){condition->values, -condition->sign, -condition->offset - 1};
+    return (condition_t){values, capture->awaited_sign, capture->awaited_offset};
 }
 
 /* Negative: the value does not reach the condition. */
@@ -79,25 +84,28 @@ static inline FX_INLINED_IF_OPTIMISED uint32_t count_until_in_periods(const cond
 }
 
 /* Passes over the samples that must lie before the trigger; the last one counts, because an edge may follow it. */
-static uint32_t pass_over(capture_t *capture, const condition_t *reached, uint32_t count)
+static uint32_t pass_over(capture_t *capture, column_t values, uint32_t count)
 {
     const capture_config_t *config = &capture->config;
     const uint32_t over = lesser(count, (uint32_t)config->before - lesser(capture->filled, config->before));
     if (over > 0U && is_edge(capture)) {
-        capture->ready = count_until(reached, over - 1U, over) == over;
+        set_ready(capture, false);
+        const condition_t other_side = awaited(capture, values);
+        set_ready(capture, count_until(&other_side, over - 1U, over) < over);
     }
     return over;
 }
 
-static uint32_t search(capture_t *capture, const condition_t *reached, uint32_t from, uint32_t count)
+static uint32_t search(capture_t *capture, column_t values, uint32_t from, uint32_t count)
 {
     uint32_t k = from;
     if (!capture->ready) {
-        const condition_t below = negated(reached);
-        k = count_until(&below, from, count);
-        capture->ready = k < count;
+        const condition_t other_side = awaited(capture, values);
+        k = count_until(&other_side, from, count);
+        set_ready(capture, k < count);
     }
-    return count_until(reached, k, count);
+    const condition_t reached = awaited(capture, values);
+    return count_until(&reached, k, count);
 }
 
 /* Number of samples from the next one until the trigger that a command or a fault has requested. */
@@ -108,47 +116,74 @@ static uint32_t until_asked(const capture_t *capture)
     return (periods <= 0) ? 0U : ((uint32_t)periods + divisor - 1U) / divisor;
 }
 
-static uint32_t until_trigger(capture_t *capture, const condition_t *reached, uint32_t count)
+static uint32_t until_trigger(capture_t *capture, column_t values, uint32_t count)
 {
-    const uint32_t over = pass_over(capture, reached, count);
-    const uint32_t until = (capture->config.trigger >= TRIGGER_RISING) ? search(capture, reached, over, count) : count;
+    const uint32_t over = pass_over(capture, values, count);
+    const uint32_t until = (capture->config.trigger >= TRIGGER_RISING) ? search(capture, values, over, count) : count;
     return capture->asked ? lesser(until, until_asked(capture)) : until;
 }
 
-/* Whether from now on only a level in the samples is waited for. */
+/* What is waited for from now on, if nothing else can end the search. */
 static capture_search_t search_of(const capture_t *capture)
 {
     const capture_config_t *config = &capture->config;
-    if (!capture->ready || capture->asked || capture->filled < config->before || config->trigger < TRIGGER_RISING ||
-        capture->trigger_place >= sizeof(sample_t)) {
+    if (capture->asked || capture->filled < config->before || config->trigger < TRIGGER_RISING) {
         return SEARCH_ANY;
     }
-    return (config->divisor == 1U) ? SEARCH_PERIODS : SEARCH_LEVEL;
+    if (is_of_step(capture->trigger_place)) {
+        return SEARCH_STEP;
+    }
+    return (config->divisor == 1U) ? SEARCH_PERIODS : SEARCH_SAMPLES;
 }
 
-/* Not inlined: the search for a level needs fewer registers. */
+/* Not inlined: the other searches need fewer registers. */
 static FX_NOT_INLINED uint32_t search_any(capture_t *capture, const sample_t *next, uint32_t count)
 {
-    const condition_t reached = condition(capture, column_of_trigger(capture, next));
-    const uint32_t until = until_trigger(capture, &reached, count);
+    const uint32_t until = until_trigger(capture, column_of_trigger(capture, next), count);
     capture->filled = (uint16_t)lesser(capture->filled + until, capture->config.samples);
     capture->search = (uint8_t)search_of(capture);
     return until;
 }
 
-static FX_NOT_INLINED uint32_t search_level(const capture_t *capture, const sample_t *next, uint32_t count)
+static FX_NOT_INLINED uint32_t search_samples(const capture_t *capture, const sample_t *next, uint32_t count)
 {
-    const condition_t reached = condition(capture, column_of_trigger(capture, next));
-    return count_until(&reached, 0, count);
+    const condition_t condition = awaited(capture, column_of_trigger(capture, next));
+    return count_until(&condition, 0, count);
+}
+
+/* A value of the step is the same in all of its periods. */
+static inline uint32_t search_step(const capture_t *capture, uint32_t count)
+{
+    const condition_t condition = awaited(capture, column_of_step(capture, capture->trigger_place));
+    return (beyond(&condition, condition.values.from) < 0) ? count : 0U;
+}
+
+static inline FX_INLINED_IF_OPTIMISED uint32_t search_periods(const capture_t *capture, const sample_t *next,
+                                                              uint32_t count)
+{
+    const column_t values = {(const uint8_t *)next + capture->trigger_place, sizeof(sample_t)};
+    const condition_t condition = awaited(capture, values);
+    return count_until_in_periods(&condition, count);
 }
 
 uint32_t trigger_search(capture_t *capture, const sample_t *next, uint32_t count)
 {
     if (capture->search == (uint8_t)SEARCH_PERIODS) {
-        const column_t values = {(const uint8_t *)next + capture->trigger_place, sizeof(sample_t)};
-        const condition_t reached = condition(capture, values);
-        return count_until_in_periods(&reached, count);
+        return search_periods(capture, next, count);
     }
-    return (capture->search == (uint8_t)SEARCH_LEVEL) ? search_level(capture, next, count)
-                                                      : search_any(capture, next, count);
+    if (capture->search == (uint8_t)SEARCH_STEP) {
+        return search_step(capture, count);
+    }
+    return (capture->search == (uint8_t)SEARCH_SAMPLES) ? search_samples(capture, next, count)
+                                                        : search_any(capture, next, count);
+}
+
+bool trigger_is_found(capture_t *capture)
+{
+    if (capture->search == (uint8_t)SEARCH_ANY || capture->ready) {
+        return true;
+    }
+    set_ready(capture, true);
+    capture->search = SEARCH_ANY;
+    return false;
 }

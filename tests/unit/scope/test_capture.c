@@ -561,8 +561,8 @@ void test_the_last_copy_has_ended_when_the_capture_is_done(void)
     expect_periods();
 }
 
-/* Several samples are searched at once when enough lie before and nothing but a level is waited for. */
-void test_what_is_searched_at_once(void)
+/* Where enough samples lie before and nothing but the signal can trigger, the search needs no other test. */
+void test_what_is_searched_without_other_tests(void)
 {
     arm_for(TRIGGER_ABOVE, NEVER);
     run_steps(2);
@@ -573,19 +573,108 @@ void test_what_is_searched_at_once(void)
     TEST_ASSERT_EQUAL(SEARCH_ANY, capture.search);
     arm_for(TRIGGER_RISING, -30000); /* no edge: the signal is never below */
     run_steps(10);
-    TEST_ASSERT_EQUAL(SEARCH_ANY, capture.search);
+    TEST_ASSERT_EQUAL(SEARCH_PERIODS, capture.search);
+    TEST_ASSERT_FALSE(capture.ready);
     arm_for(TRIGGER_MANUAL, 0);
     run_steps(10);
     TEST_ASSERT_EQUAL(SEARCH_ANY, capture.search);
     config.divisor = 2;
     arm_for(TRIGGER_ABOVE, NEVER);
     run_steps(10);
-    TEST_ASSERT_EQUAL(SEARCH_LEVEL, capture.search);
-    config.divisor = 1;
+    TEST_ASSERT_EQUAL(SEARCH_SAMPLES, capture.search);
     config.trigger_signal = CAPTURE_i_d_ref_A;
     arm_for(TRIGGER_ABOVE, NEVER);
     run_steps(10);
-    TEST_ASSERT_EQUAL(SEARCH_ANY, capture.search);
+    TEST_ASSERT_EQUAL(SEARCH_STEP, capture.search);
+}
+
+static uint32_t random_state;
+
+static uint32_t draw(uint32_t below)
+{
+    random_state = random_state * 1664525U + 1013904223U;
+    return (random_state >> 16) % below;
+}
+
+static int16_t drawn_value(void)
+{
+    static int16_t value;
+    value = (draw(4) == 0U) ? (int16_t)((int32_t)draw(61) - 30) : value; /* often the same as before */
+    return value;
+}
+
+/* The trigger's value in each sample since the arming, and the first sample that triggers by the definition. */
+static int16_t seen[PERIODS];
+
+static uint32_t first_trigger(uint32_t samples)
+{
+    const bool downwards = config.trigger == TRIGGER_FALLING || config.trigger == TRIGGER_BELOW;
+    const bool is_edge = config.trigger == TRIGGER_RISING || config.trigger == TRIGGER_FALLING;
+    const uint32_t first = config.before - ((config.before > 0U) ? 1U : 0U);
+    bool ready = !is_edge;
+    for (uint32_t k = first; k < samples; k++) {
+        const bool reached = downwards ? seen[k] <= config.level : seen[k] >= config.level;
+        if (reached && ready && k >= config.before) {
+            return k;
+        }
+        ready = ready || !reached;
+    }
+    return samples;
+}
+
+static void draw_config(void)
+{
+    const uint8_t triggers[] = {TRIGGER_RISING, TRIGGER_FALLING, TRIGGER_ABOVE, TRIGGER_BELOW};
+    config.signals = 3;
+    config.signal[2] = CAPTURE_i_d_ref_A;
+    config.trigger = triggers[draw(4)];
+    config.trigger_signal = (uint8_t)((draw(2) == 0U) ? CAPTURE_i_q_A : CAPTURE_i_d_ref_A);
+    config.divisor = (uint16_t)((draw(2) == 0U) ? 1U : 1U + draw(12));
+    config.samples = (uint16_t)(1U + draw(200));
+    config.before = (uint16_t)draw(config.samples);
+    config.level = (int16_t)((int32_t)draw(65) - 32);
+}
+
+/* One step of the task with some periods; returns the number of samples since the arming. */
+static uint32_t drawn_step(uint32_t samples, uint32_t armed_at)
+{
+    uint32_t count = samples;
+    capture.values.i_d_ref = drawn_value();
+    for (uint32_t left = 1U + draw(25); left > 0U; left--) {
+        newest++;
+        write_period(newest, drawn_value());
+        if ((newest - armed_at - 1U) % config.divisor == 0U) {
+            seen[count] = (config.trigger_signal == CAPTURE_i_q_A) ? written[newest] : capture.values.i_d_ref;
+            count++;
+        }
+    }
+    step();
+    return count;
+}
+
+/* Against the definition of the trigger: random signals, configurations and lengths of the steps. */
+void test_every_trigger_is_the_first_one(void)
+{
+    uint32_t found = 0;
+    random_state = 1;
+    for (uint32_t n = 0; n < 3000U; n++) {
+        setUp();
+        draw_config();
+        arm();
+        const uint32_t armed_at = newest;
+        uint32_t samples = 0;
+        while (newest < PERIODS - 30U && capture.state != CAPTURE_DONE) {
+            samples = drawn_step(samples, armed_at);
+        }
+        const uint32_t expected = first_trigger(samples);
+        TEST_ASSERT_EQUAL(expected == samples, capture.state == CAPTURE_ARMED);
+        if (capture.state == CAPTURE_DONE) {
+            TEST_ASSERT_EQUAL_UINT32(armed_at + 1U + expected * config.divisor, trigger_period());
+            expect_periods();
+            found++;
+        }
+    }
+    TEST_ASSERT_TRUE(found > 2000U);
 }
 
 void test_eight_signals_of_all_kinds(void)

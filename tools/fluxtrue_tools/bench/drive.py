@@ -252,6 +252,8 @@ TASK_TITLES = {
     "scope_armed": "scope, armed: eight values of ten periods, and the search",
     "scope_mixed": "scope, armed: two of the period and six of the task, and the search",
     "scope_seldom": "scope, armed: eight values of each tenth period, and the search",
+    "scope_value": "scope, armed: eight values of ten periods, and the search in a value of the task",
+    "scope_edge": "scope, armed: eight values of ten periods, and the search for the other side of an edge",
     "scope_triggered": "scope, triggered: eight values of ten periods",
 }
 PAPERS = ("schedule",)

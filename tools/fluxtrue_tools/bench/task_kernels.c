@@ -41,6 +41,8 @@ void task_scope_idle(void);
 void task_scope_armed(void);
 void task_scope_mixed(void);
 void task_scope_seldom(void);
+void task_scope_value(void);
+void task_scope_edge(void);
 void task_scope_triggered(void);
 
 static drive_t copy;
@@ -49,7 +51,7 @@ static volatile int32_t result;
 static supervisor_t supervisor = {.state = STATE_RUN, .enabled = true, .enable_seen = true};
 static arbitrate_state_t arbitration;
 static second_level_t second_level;
-static scope_t idle_scope, armed_scope, mixed_scope, seldom_scope, triggered_scope;
+static scope_t idle_scope, armed_scope, mixed_scope, seldom_scope, value_scope, edge_scope, triggered_scope;
 
 /* The drive by its address, as the task has it. */
 static drive_t *the_copy(void)
@@ -86,10 +88,18 @@ static void prepare_scopes(void)
     }
     config.divisor = PERIODS_OF_A_STEP;
     arm(&seldom_scope, &config, before);
+    config.divisor = 1;
+    config.trigger_signal = CAPTURE_i_d_ref_A;
+    arm(&value_scope, &config, before);
+    config.trigger = TRIGGER_RISING;
+    config.trigger_signal = CAPTURE_v_dc_V;
+    config.level = INT16_MIN; /* the signal is never below */
+    arm(&edge_scope, &config, before);
+    config.trigger = TRIGGER_ABOVE;
+    config.level = INT16_MAX;
     const uint8_t mixed[CAPTURE_SIGNALS_MAX] = {
         CAPTURE_i_d_A,       CAPTURE_i_d_ref_A,           CAPTURE_i_q_ref_A,           CAPTURE_torque_commanded_Nm,
         CAPTURE_omega_rad_s, CAPTURE_torque_corrected_Nm, CAPTURE_torque_estimated_Nm, CAPTURE_psi_error_Vs};
-    config.divisor = 1;
     memcpy(config.signal, mixed, sizeof mixed);
     arm(&mixed_scope, &config, before);
 }
@@ -316,6 +326,16 @@ CALLED void task_scope_mixed(void)
 CALLED void task_scope_seldom(void)
 {
     scope_step(&seldom_scope, the_copy(), false, false);
+}
+
+CALLED void task_scope_value(void)
+{
+    scope_step(&value_scope, the_copy(), false, false);
+}
+
+CALLED void task_scope_edge(void)
+{
+    scope_step(&edge_scope, the_copy(), false, false);
 }
 
 CALLED void task_scope_triggered(void)
