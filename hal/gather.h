@@ -5,7 +5,7 @@
  *   Each column takes one half word from each of several places that are a constant distance apart. The half words of
  *   one place go to adjacent half words, a row; the next row begins a constant distance later. A copy has one part or
  *   two. Each part begins where the last one has ended, unless the columns have been moved before it was added.
- *   A port without such hardware never reports that it is idle: the scope then copies by itself (scope/columns.c).
+ *   A port without such hardware never reports that it is idle: the scope then copies by itself (scope/copy.c).
  * Source   docs/howto/port.md, docs/decisions/020-scope.md
  * Units    bytes, values
  * Range    1 ... HAL_GATHER_COLUMNS columns; with a distance above 32767 bytes each part has one value, and its columns

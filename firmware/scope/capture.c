@@ -3,6 +3,7 @@
 
 #include "fx/codegen.h"
 #include "scope/columns.h"
+#include "scope/copy.h"
 #include "scope/trigger.h"
 
 #define USABLE (SAMPLE_SLOTS - 4U) /* the fast ISR may complete 4 periods until a step's samples have been copied */
@@ -31,6 +32,7 @@ static FX_NOT_INLINED FX_COLD void begin(capture_t *capture, const capture_confi
                            .coming = capture->coming,
                            .recording = CAPTURE_RECORDS};
     columns_find(capture);
+    copy_reset(capture);
 }
 
 void capture_arm(capture_t *capture, const capture_config_t *config, uint32_t newest)
@@ -88,13 +90,13 @@ static FX_NOT_INLINED void begin_run(capture_t *capture)
     capture->at = (uint16_t)((capture->at == capture->config.samples) ? 0U : capture->at);
     capture->run = (uint16_t)lesser(slots / capture->config.divisor + 1U,
                                     (uint32_t)capture->config.samples - capture->at);
-    columns_move(capture);
+    copy_move(capture);
 }
 
 static void take(capture_t *capture, int16_t *memory, const sample_t *next, uint32_t count)
 {
     const capture_config_t *config = &capture->config;
-    columns_copy(capture, memory, next, count);
+    copy_samples(capture, memory, next, count);
     capture->next += count * config->divisor;
     capture->at = (uint16_t)(capture->at + count);
     capture->run = (uint16_t)(capture->run - count);
@@ -104,7 +106,7 @@ static void take(capture_t *capture, int16_t *memory, const sample_t *next, uint
  * next one. */
 static FX_NOT_INLINED FX_COLD void end(capture_t *capture)
 {
-    if (columns_are_pending(capture)) {
+    if (copy_is_pending(capture)) {
         if (capture->recording == (uint8_t)CAPTURE_RECORDS) {
             capture->recording = CAPTURE_ENDS;
             capture->next -= capture->config.divisor; /* a period that has passed: the next step comes here, too */
@@ -161,7 +163,7 @@ static FX_NOT_INLINED FX_COLD void skip_lost_periods(capture_t *capture, uint32_
 
 void capture_step(capture_t *capture, int16_t *memory, const sample_t *slot, uint32_t newest)
 {
-    columns_begin(capture);
+    copy_begin(capture);
     while ((int32_t)(newest - capture->next) >= 0) {
         if (capture->recording != (uint8_t)CAPTURE_RECORDS) {
             if (capture->recording == (uint8_t)CAPTURE_ENDS) {
@@ -175,5 +177,5 @@ void capture_step(capture_t *capture, int16_t *memory, const sample_t *slot, uin
             record(capture, memory, slot, newest);
         }
     }
-    columns_end(capture);
+    copy_end(capture);
 }

@@ -9,7 +9,7 @@
  *     STEP(field)    of scope_step_values_t: a value of the 1 kHz task, constant between two of its commands
  * Source   docs/howto/scope.md
  * Units    a name ends in its unit
- * Context  scope/columns.c copies them, ecu/a2l_records.c describes them to tools */
+ * Context  scope/columns.c finds them, ecu/a2l_records.c describes them to tools */
 
 #define SCOPE_SIGNAL_LIST(X) \
     X(i_d_A, CURRENT, PERIOD(point.i.d), "Current along the magnet") \

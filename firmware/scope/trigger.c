@@ -180,10 +180,7 @@ uint32_t trigger_search(capture_t *capture, const sample_t *next, uint32_t count
 
 bool trigger_is_found(capture_t *capture)
 {
-    if (capture->search == (uint8_t)SEARCH_ANY || capture->ready) {
-        return true;
-    }
+    const bool found = capture->search == (uint8_t)SEARCH_ANY || capture->ready;
     set_ready(capture, true);
-    capture->search = SEARCH_ANY;
-    return false;
+    return found;
 }

@@ -8,7 +8,7 @@
 #include "late_gather.h"
 #include "unity.h"
 
-#define PERIODS 4000
+#define PERIODS 4000U
 #define STEP 10 /* periods from one step of the task to the next */
 #define NEVER 30000
 
@@ -630,46 +630,85 @@ static void draw_config(void)
     config.trigger = triggers[draw(4)];
     config.trigger_signal = (uint8_t)((draw(2) == 0U) ? CAPTURE_i_q_A : CAPTURE_i_d_ref_A);
     config.divisor = (uint16_t)((draw(2) == 0U) ? 1U : 1U + draw(12));
-    config.samples = (uint16_t)(1U + draw(200));
+    config.samples = (uint16_t)(1U + draw(150));
     config.before = (uint16_t)draw(config.samples);
     config.level = (int16_t)((int32_t)draw(65) - 32);
 }
 
-/* One step of the task with some periods; returns the number of samples since the arming. */
-static uint32_t drawn_step(uint32_t samples, uint32_t armed_at)
+/* Since the arming, or since a gap. */
+static uint32_t samples, first_period, asked_for, asked;
+
+#define SEARCHED 1800U /* so that the samples after the trigger have periods in the record, too */
+
+/* The sample that a command for this period triggers, unless the signal does so before. */
+static uint32_t sample_of(uint32_t period)
 {
-    uint32_t count = samples;
+    const uint32_t after = (period > first_period) ? period - first_period : 0U;
+    const uint32_t k = (after + config.divisor - 1U) / config.divisor;
+    return (k > samples) ? k : samples;
+}
+
+static void drawn_command(void)
+{
+    asked_for = newest + 40U - draw(43);
+    capture_trigger(&capture, offset + asked_for);
+    asked = sample_of(asked_for);
+}
+
+/* One step of the task with some periods, now and then with more than the ring holds. */
+static void drawn_step(void)
+{
+    const bool is_late = draw(60) == 0U;
+    const bool begins_anew = is_late && capture.state == CAPTURE_ARMED;
     capture.values.i_d_ref = drawn_value();
-    for (uint32_t left = 1U + draw(25); left > 0U; left--) {
+    for (uint32_t left = is_late ? SAMPLE_SLOTS + 12U + draw(5) : 1U + draw(25); left > 0U; left--) {
         newest++;
         write_period(newest, drawn_value());
-        if ((newest - armed_at - 1U) % config.divisor == 0U) {
-            seen[count] = (config.trigger_signal == CAPTURE_i_q_A) ? written[newest] : capture.values.i_d_ref;
-            count++;
+        if (begins_anew && left == 1U) {
+            first_period = newest;
+            samples = 0;
+            asked = (asked == PERIODS) ? PERIODS : sample_of(asked_for);
+        }
+        if ((newest - first_period) % config.divisor == 0U) {
+            seen[samples] = (config.trigger_signal == CAPTURE_i_q_A) ? written[newest] : capture.values.i_d_ref;
+            samples++;
         }
     }
     step();
-    return count;
 }
 
-/* Against the definition of the trigger: random signals, configurations and lengths of the steps. */
+static void drawn_capture(void)
+{
+    setUp();
+    draw_config();
+    arm();
+    first_period = newest + 1U;
+    samples = 0;
+    asked = PERIODS;
+    const uint32_t commanded = (draw(3) == 0U) ? draw(20) : PERIODS;
+    for (uint32_t n = 0; newest < SEARCHED && capture.state == CAPTURE_ARMED; n++) {
+        if (n == commanded) {
+            drawn_command();
+        }
+        drawn_step();
+    }
+}
+
+/* Against the definition of the trigger: random signals, configurations, commands and lengths of the steps. */
 void test_every_trigger_is_the_first_one(void)
 {
     uint32_t found = 0;
     random_state = 1;
     for (uint32_t n = 0; n < 3000U; n++) {
-        setUp();
-        draw_config();
-        arm();
-        const uint32_t armed_at = newest;
-        uint32_t samples = 0;
-        while (newest < PERIODS - 30U && capture.state != CAPTURE_DONE) {
-            samples = drawn_step(samples, armed_at);
-        }
-        const uint32_t expected = first_trigger(samples);
-        TEST_ASSERT_EQUAL(expected == samples, capture.state == CAPTURE_ARMED);
-        if (capture.state == CAPTURE_DONE) {
-            TEST_ASSERT_EQUAL_UINT32(armed_at + 1U + expected * config.divisor, trigger_period());
+        drawn_capture();
+        const uint32_t by_signal = first_trigger(samples);
+        const uint32_t expected = (by_signal < asked) ? by_signal : asked;
+        TEST_ASSERT_EQUAL(expected >= samples, capture.state == CAPTURE_ARMED);
+        if (capture.state != CAPTURE_ARMED) {
+            TEST_ASSERT_EQUAL_UINT32(first_period + expected * config.divisor, trigger_period());
+            while (capture.state != CAPTURE_DONE) {
+                drawn_step();
+            }
             expect_periods();
             found++;
         }
