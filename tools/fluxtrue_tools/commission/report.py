@@ -6,9 +6,27 @@ import math
 import numpy as np
 
 from fluxtrue_tools.commission import iron
+from fluxtrue_tools.commission.harmonics import LARGE_RAD, Harmonics
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.steps import Found
 from fluxtrue_tools.motor.map_import.grid import Grid
+
+
+def _harmonics(found: Harmonics | None) -> list[str]:
+    if found is None:
+        return ["  harmonics of the angle sensor: not measured"]
+    waves = "; ".join(
+        f"{often} per turn {math.degrees(abs(wave.value_rad)):.2f} ±{math.degrees(wave.sigma_rad):.1g} degrees, most "
+        f"{math.degrees(wave.phase_rad) / k:.0f} degrees after its zero"
+        for k, often, wave in ((1, "once", found.first), (2, "twice", found.second))
+    )
+    lines = [f"  harmonics of the angle sensor, electrical amplitudes: {waves}; three and four times per turn at most "
+             f"{math.degrees(found.further_rad):.2f} degrees"]  # fmt: skip
+    if found.is_large:
+        lines.append(f"  THE ANGLE SENSOR IS UNEVEN, by more than {math.degrees(LARGE_RAD):.0f} electrical degrees: "
+                     "check how it is mounted (centred, parallel to the shaft, at the right distance, away from "
+                     "magnetic fields), and measure again")  # fmt: skip
+    return lines
 
 
 def _turning(found: Found, known: Nameplate) -> list[str]:
@@ -24,6 +42,7 @@ def _turning(found: Found, known: Nameplate) -> list[str]:
         lines.append(f"magnet: psi_f = {spun.psi_f_Vs:.4g} V·s, ±{spun.psi_f_sigma_Vs:.1g} V·s beyond the sensors' "
                      f"gains; offset of the angle ±{degrees:.1g} degrees; the angle is late by "
                      f"{1e6 * spun.lag_s:.1f} us")  # fmt: skip
+        lines += _harmonics(spun.harmonics)
     if found.drag is not None:
         drag = found.drag
         ends = ", ".join(f"{drag.torque_Nm(np.array(w)):.3g} N·m at {30.0 * w / math.pi:.0f} rpm"
