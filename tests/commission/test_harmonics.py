@@ -3,17 +3,20 @@
 
 import cmath
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from fluxtrue_tools.commission import harmonics, hidden, report, spin, turning
+from fluxtrue_tools.commission import bus_turning, harmonics, hidden, report, spin, turning
+from fluxtrue_tools.commission.bus import UNKNOWN, OverTheBus
 from fluxtrue_tools.commission.harmonics import Coasting, Harmonics
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import harmonics_deg, waves_rad
 from fluxtrue_tools.commission.steps import Found, chosen, run
 from fluxtrue_tools.motor.flux_model import Array
+from fluxtrue_tools.scope.xcp import XcpRefused
 from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
 
@@ -118,8 +121,23 @@ def test_a_badly_mounted_sensor_of_a_hidden_machine_is_found_and_said(
     offset_deg = math.degrees(math.remainder(found.connection.offset_rad - truth.offset_rad, turning.TURN))
     assert abs(offset_deg) < 0.2
     said = report.text(Found(spun=found), known, None)
-    assert "THE ANGLE SENSOR IS UNEVEN" in said and "check how it is mounted" in said
+    assert "the angle sensor is uneven by more than 2 electrical degrees" in said and "check how it is mounted" in said
 
 
 def test_a_report_without_a_measurement_says_so() -> None:
     assert report._harmonics(None) == ["  harmonics of the angle sensor: not measured"]
+
+
+def test_a_firmware_that_does_not_tell_its_correction_leaves_the_harmonics_open(known: Nameplate) -> None:
+    """As one of an earlier version: nothing else of the step depends on it."""
+
+    def refuse(*command: int) -> bytes:
+        raise XcpRefused(command[0], UNKNOWN)
+
+    drive = OverTheBus.__new__(OverTheBus)
+    drive._master = SimpleNamespace(command=refuse)  # type: ignore[assignment]
+    assert drive.angle_correction() == []
+    assert bus_turning._sensor(drive, known, 100.0) is None
+    wired = spin.Spun(turning.Connection(4, False, 0.0), 0.1, 1e-4, 1e-4, 0.0, 500.0)
+    seen = harmonics.fit([window(0.3, 100.0, {}, 4)])
+    assert spin._harmonics([spin.Magnet(0.1 + 0j, 500.0, seen), spin.Magnet(0.1 + 0j, 500.0)], wired, known) is None

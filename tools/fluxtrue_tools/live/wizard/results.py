@@ -50,11 +50,11 @@ def _phases(found: Found, known: Nameplate, _: float) -> list[Row]:
 def _harmonics(found: Harmonics | None) -> list[Row]:
     if found is None:
         return [("Harmonics of the angle sensor", "not measured", "", "")]
-    rows = [(f"Angle sensor uneven {often} per turn, electrical", f"{math.degrees(abs(wave.value_rad)):.2f}°",
+    rows = [(f"Harmonic of the angle sensor {often} per turn, electrical", f"{math.degrees(abs(wave.value_rad)):.2f}°",
              f"{math.degrees(wave.sigma_rad):.1g}°", f"± at most {HARMONIC_DEG:g}°")
             for often, wave in (("once", found.first), ("twice", found.second))]  # fmt: skip
-    often = "Three and four times per turn, electrical"
-    rows.append((often, f"{math.degrees(found.further_rad):.2f}°", "", f"± at most {HARMONIC_DEG:g}°"))
+    rows.append(("The larger of three and four times per turn", f"{math.degrees(found.further_rad):.2f}°", "",
+                 f"± at most {HARMONIC_DEG:g}°"))  # fmt: skip
     if found.is_large:
         rows.append(("Check how the angle sensor is mounted", f"more than {math.degrees(LARGE_RAD):.0f}°", "", ""))
     return rows
