@@ -50,7 +50,7 @@ static xcp_result_t set_field(pulses_config_t *config, uint8_t field, uint16_t r
 xcp_result_t pulse_access_command(drive_t *drive, bool unlocked, const uint8_t *command, uint8_t length)
 {
     pulses_request_t *request = &drive->request.pulses;
-    if (command[0] == PULSE_STATE || command[0] == MOVEMENT_STATE) {
+    if (command[0] >= PULSE_STATE) { /* it and those after it only answer */
         return XCP_OK;
     }
     if (!unlocked) {
@@ -77,5 +77,10 @@ void pulse_access_state(const drive_t *drive, uint8_t command, can_frame_t *answ
         answer->data[1] = (uint8_t)movement->phase;
         answer->data[2] = (uint8_t)movement->failure;
         answer->length = 3;
+    }
+    const uint32_t coefficient = (uint32_t)command - ANGLE_CORRECTION;
+    if (coefficient < ANGLE_HARMONICS) {
+        xcp_put_u32(&answer->data[1], (uint32_t)drive->task.angle_harmonics.c[coefficient]);
+        answer->length = 5;
     }
 }

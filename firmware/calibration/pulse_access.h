@@ -6,9 +6,11 @@
  *   PULSE_START  starts them once; the drive refuses them unless it runs, stands and has no request (drive/pulsing.c)
  *   PULSE_STATE  answers pulses_phase_t and pulses_failure_t, one byte each
  *   MOVEMENT_STATE  the same of the movement: movement_phase_t, movement_failure_t (drive/movement.h)
+ *   ANGLE_CORRECTION ... +3  answers a coefficient of the correction of the angle sensor, four bytes, little endian:
+ *                c_1, s_1, c_2, s_2 (control/adapt/angle_harmonics.h)
  * Source   docs/howto/commission.md
  * Units    voltages and the share of the first half wave in q15, currents in q15 of the current's base, the angle in
- *          turns times 2^16, delay and time in PWM periods
+ *          turns times 2^16, delay and time in PWM periods, coefficients in mechanical turns times 2^32
  * Range    the drive checks the values when the pulses are started
  * Errors   the protocol's codes; setting and starting need the key, as they change what the drive does
  * Context  1 kHz task, before the drive's step */
@@ -19,7 +21,14 @@
 #include "types/can_frame.h"
 
 /** First byte of a command. */
-enum { PULSE_SET = 0x10, PULSE_START = 0x11, PULSE_STATE = 0x12, MOVEMENT_STATE = 0x13 };
+enum {
+    PULSE_SET = 0x10,
+    PULSE_START = 0x11,
+    PULSE_STATE = 0x12,
+    MOVEMENT_STATE = 0x13,
+    ANGLE_CORRECTION = 0x14,
+    PULSE_ACCESS_LAST = ANGLE_CORRECTION + ANGLE_HARMONICS - 1
+};
 
 /** The fields of PULSE_SET, in the order of pulses_config_t. */
 enum {
@@ -38,12 +47,12 @@ enum {
 
 static inline bool pulse_access_is_command(uint8_t command)
 {
-    return command >= PULSE_SET && command <= MOVEMENT_STATE;
+    return command >= PULSE_SET && command <= PULSE_ACCESS_LAST;
 }
 
 /** command: without the protocol's own code, at least one byte. */
 xcp_result_t pulse_access_command(drive_t *drive, bool unlocked, const uint8_t *command, uint8_t length);
-/** Writes the bytes of the answer after its first one: only PULSE_STATE and MOVEMENT_STATE have any. */
+/** Writes the bytes of the answer after its first one: those that set or start have none. */
 void pulse_access_state(const drive_t *drive, uint8_t command, can_frame_t *answer);
 
 #endif

@@ -19,7 +19,8 @@ from fluxtrue_tools.sim import motor as motors
 from fluxtrue_tools.sim.motor import Motor
 
 NAME, SEED = "saturated", 101
-OFFSET_DEG, PSI_F, INERTIA, DRAG = 0.2, 0.005, 0.03, 0.1  # the bounds of test_turning.py
+OFFSET_DEG, HARMONICS_DEG, PSI_F, INERTIA, DRAG = 0.2, 0.2, 0.005, 0.03, 0.1  # the bounds of test_turning.py
+HARMONICS = {"angle_h1_rad": 0.02, "angle_h1_phase": 1.0, "angle_h2_rad": 0.01, "angle_h2_phase": 4.0}
 LIMIT_S = 2.0  # of acceleration without an end by the tool
 SMALL_S = 0.2
 STOPPED_S = 0.05  # time-out of 30 ms and one step of the tool
@@ -32,11 +33,15 @@ def stand(unknown: Motor, known: Nameplate, tmp_path: Path) -> Iterator[Stand]:
 
 
 def test_an_unknown_connection_magnet_inertia_and_drag_over_can(stand: Stand, known: Nameplate) -> None:
+    """The sensor has harmonics, which the firmware corrects more and more while the shaft turns."""
+    stand.truth.plant.update(HARMONICS)
+    stand.channel.set(**HARMONICS)
     found = run(stand.drive, chosen(("drag",)), known, lambda _: None)
     errors = turned(found, stand.truth)
     print(f"{NAME} {SEED}: {errors}, {stand.line.now_s:.0f} s simulated")
     assert errors.is_connected
     assert abs(errors.offset_deg) <= OFFSET_DEG
+    assert errors.harmonics_deg <= HARMONICS_DEG
     assert abs(errors.psi_f) <= PSI_F
     assert abs(errors.inertia) <= INERTIA
     assert errors.drag <= DRAG

@@ -20,7 +20,7 @@ from fluxtrue_tools.sim.motor import Motor
 
 # With errors of other kinds the drag of pmasynrm 127 takes all torque of the largest current below the wanted speed.
 MACHINES = [("saturated", 101, False), ("pmasynrm", 107, False), ("hsm1", 135, False), ("pmasynrm", 127, True)]
-OFFSET_DEG, PSI_F, INERTIA, DRAG = 0.2, 0.005, 0.03, 0.1
+OFFSET_DEG, HARMONICS_DEG, PSI_F, INERTIA, DRAG = 0.2, 0.2, 0.005, 0.03, 0.1
 SILENT, FAST = 1.0, 2.0
 RUN = 1.0
 STEP_S = 1e-3
@@ -37,6 +37,7 @@ def test_an_unknown_connection_magnet_inertia_and_drag(
     print(f"{name} {seed}: {errors}")
     assert errors.is_connected
     assert abs(errors.offset_deg) <= OFFSET_DEG
+    assert errors.harmonics_deg <= HARMONICS_DEG
     assert abs(errors.psi_f) <= PSI_F
     assert abs(errors.inertia) <= INERTIA
     assert errors.drag <= DRAG

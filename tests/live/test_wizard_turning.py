@@ -161,6 +161,9 @@ def test_angle_offset_and_magnet_are_found(bench: Bench) -> None:
     offset_deg = value(rows["Electrical angle at the sensor's zero"][0])
     assert abs(math.remainder(offset_deg - math.degrees(truth.offset_rad), 360.0)) <= OFFSET_DEG
     assert value(rows["Electrical angle at the sensor's zero"][1]) > 0.0
+    for often in ("once", "twice"):
+        found, sigma, _ = rows[f"Harmonic of the angle sensor {often} per turn, electrical"]
+        assert value(found) <= OFFSET_DEG and 0.0 < value(sigma) <= OFFSET_DEG
 
 
 def test_inertia_and_drag_are_found(bench: Bench) -> None:

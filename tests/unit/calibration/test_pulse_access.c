@@ -85,6 +85,26 @@ void test_the_state_of_the_movement_needs_no_key(void)
     TEST_ASSERT_EQUAL_UINT8(MOVEMENT_FAILURE_FAST, answer.data[2]);
 }
 
+void test_the_correction_of_the_angle_needs_no_key(void)
+{
+    static const int32_t coefficients[ANGLE_HARMONICS] = {0x01020304, -2, 3, -0x00FFFFFF};
+    static const uint8_t expected[ANGLE_HARMONICS][4] = {
+        {0x04, 0x03, 0x02, 0x01}, {0xFE, 0xFF, 0xFF, 0xFF}, {3, 0, 0, 0}, {0x01, 0x00, 0x00, 0xFF}};
+    for (unsigned n = 0; n < ANGLE_HARMONICS; n++) {
+        drive.task.angle_harmonics.c[n] = coefficients[n];
+    }
+    for (uint8_t n = 0; n < ANGLE_HARMONICS; n++) {
+        const uint8_t command[1] = {(uint8_t)(ANGLE_CORRECTION + n)};
+        can_frame_t answer = {.length = 1};
+        TEST_ASSERT_TRUE(pulse_access_is_command(command[0]));
+        TEST_ASSERT_EQUAL_INT(XCP_OK, pulse_access_command(&drive, false, command, 1));
+        pulse_access_state(&drive, command[0], &answer);
+        TEST_ASSERT_EQUAL_UINT8(5, answer.length);
+        TEST_ASSERT_EQUAL_UINT8_ARRAY(expected[n], &answer.data[1], 4);
+    }
+    TEST_ASSERT_FALSE(pulse_access_is_command(ANGLE_CORRECTION + ANGLE_HARMONICS));
+}
+
 void test_the_state_is_phase_and_failure(void)
 {
     can_frame_t answer = {.length = 8};

@@ -340,7 +340,7 @@ void test_a_user_command_without_its_second_byte_is_too_short(void)
     expect(0xFE, 0x21);
 }
 
-/* The commands of pulses and movement are 0x10 ... 0x13; the neighbours are the scope's, which knows neither. */
+/* The commands of pulses, movement and angle are 0x10 ... 0x17; the neighbours are the scope's, which knows neither. */
 void test_the_commands_of_the_voltage_pulses_are_theirs(void)
 {
     connect();
@@ -353,6 +353,10 @@ void test_the_commands_of_the_voltage_pulses_are_theirs(void)
     TEST_ASSERT_TRUE(send(2, USER_CMD, MOVEMENT_STATE));
     TEST_ASSERT_EQUAL_UINT8(3, answer.length);
     TEST_ASSERT_EQUAL_UINT8(MOVEMENT_FAILURE_LONG, answer.data[2]);
+    drive.task.angle_harmonics.c[3] = -2;
+    TEST_ASSERT_TRUE(send(2, USER_CMD, PULSE_ACCESS_LAST));
+    TEST_ASSERT_EQUAL_UINT8(5, answer.length);
+    TEST_ASSERT_EQUAL_HEX8(0xFE, answer.data[1]);
     for (uint8_t command = PULSE_SET; command <= PULSE_START; command++) {
         TEST_ASSERT_TRUE(send(2, USER_CMD, command));
         TEST_ASSERT_EQUAL_HEX8(0xFE, answer.data[0]);
@@ -360,6 +364,6 @@ void test_the_commands_of_the_voltage_pulses_are_theirs(void)
     }
     TEST_ASSERT_TRUE(send(2, USER_CMD, PULSE_SET - 1));
     TEST_ASSERT_EQUAL_HEX8(0x20, answer.data[1]);
-    TEST_ASSERT_TRUE(send(2, USER_CMD, MOVEMENT_STATE + 1));
+    TEST_ASSERT_TRUE(send(2, USER_CMD, PULSE_ACCESS_LAST + 1));
     TEST_ASSERT_EQUAL_HEX8(0x20, answer.data[1]);
 }

@@ -28,6 +28,7 @@ from fluxtrue_tools.scope.xcp import DOWNLOAD, SET_MTA, XcpMaster, XcpRefused, u
 
 USER: Final = 0xF1
 PULSE_SET, PULSE_START, PULSE_STATE, MOVEMENT_STATE = 0x10, 0x11, 0x12, 0x13  # firmware/calibration/pulse_access.h
+ANGLE_CORRECTION: Final = 0x14  # the same: the first of four coefficients, in turns times 2^32
 FIELDS: Final = ("pulses_vd", "pulses_id_low_A", "pulses_id_high_A", "pulses_vq", "pulses_iq_low_A", "pulses_iq_high_A",
                  "pulses_first", "pulses_angle_rad", "pulses_delay", "pulses_reversals", "pulses_periods")  # fmt: skip
 UNKNOWN: Final = 0x20
@@ -247,6 +248,18 @@ class OverTheBus:
         """The mechanical speed, positive in the electrical direction: the drive reports it with its own pole pairs."""
         share = self._known.pole_pairs / self._connection.pole_pairs
         return self.get("speed_rpm") * share * math.pi / 30.0
+
+    def angle_correction(self) -> list[complex]:
+        """What the firmware adds to the sensor's angle, once and twice per turn: Re(value exp(j k theta)), mechanical,
+        rad. Empty if the firmware has no such command."""
+        try:
+            got = [self._master.command(USER, ANGLE_CORRECTION + n) for n in range(4)]
+        except XcpRefused as error:
+            if error.code != UNKNOWN:
+                raise
+            return []
+        cosine_1, sine_1, cosine_2, sine_2 = (struct.unpack("<i", bytes(each[:4]))[0] for each in got)
+        return [2.0 * math.pi / 2**32 * complex(c, -s) for c, s in ((cosine_1, sine_1), (cosine_2, sine_2))]
 
     def damp(self, is_damped: bool) -> None:
         """Brake the swing of the rotor about the current, in the firmware."""

@@ -7,12 +7,14 @@ is that of software in the loop (connection.py, spin.py, drag.py).
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from fluxtrue_tools.commission import connection, drag, spin, turning
 from fluxtrue_tools.commission.bus import OverTheBus
+from fluxtrue_tools.commission.harmonics import ORDERS, Coasting, Direction, fit
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.spin import Magnet
 from fluxtrue_tools.commission.turning import Connection
@@ -24,6 +26,7 @@ ROTATED: Final = ("theta_e_rad", "sensor_turns")
 DIVISOR_SLOW: Final = 100  # 10 ms: of the slow turn
 MARGIN_S: Final = 0.1  # beside the movement
 TAKEN: Final = ("id_A", "iq_A", "ud_V", "uq_V", "theta_e_rad")
+SENSOR: Final = ("sensor_turns", "iq_A")
 ROWS: Final = WORDS // len(TAKEN)
 LEVEL_SETTLE_S: Final = 0.3
 OFF_SHARE: Final = 0.01  # of i_max: a mean current so far from the wanted one has not settled
@@ -97,10 +100,32 @@ def direction(drive: OverTheBus, known: Nameplate, wanted_rad_s: float, rough: C
                 raise FluxtrueError(f"commission: {spin.NAME}: {i_d_A:.3g} A along d did not settle: "
                                     f"{mean_A.real:.3g} A flow")  # fmt: skip
             q_A -= mean_A.imag
+        sensor = _sensor(drive, known, wanted_rad_s)
         _brake(drive, known, wanted_rad_s)
     finally:
         drive.set(spin.COMPENSATION, compensation)
-    return spin.magnet(taken, drive.period_s, known.offset_A)
+    return replace(spin.magnet(taken, drive.period_s, known.offset_A), sensor=sensor)
+
+
+def _sensor(drive: OverTheBus, known: Nameplate, wanted_rad_s: float) -> Direction | None:
+    """A window without current. The scope captures the angle that the firmware has corrected: its correction, which
+    it adapts while the shaft turns, is taken away again."""
+    if not drive.angle_correction():
+        return None
+    _accelerate(drive, known, wanted_rad_s, spin.NAME, spin.TURNED)
+    turning.currents(drive, 0.0, 0.0)
+    drive.rest(LEVEL_SETTLE_S)
+    corrections = []
+
+    def coast(seconds: float) -> None:
+        corrections.append(drive.angle_correction())
+        drive.rest(seconds)
+        corrections.append(drive.angle_correction())
+
+    rows = drive.capture_during(SENSOR, WORDS // len(SENSOR), 1, coast)
+    found = fit([Coasting(rows[:, 0], rows[:, 1], drive.period_s)])
+    correction = np.mean(corrections, axis=0)
+    return replace(found, waves=found.waves - np.append(correction, np.zeros(len(ORDERS) - len(correction))))
 
 
 def _and_none(drive: OverTheBus, seconds: float) -> None:

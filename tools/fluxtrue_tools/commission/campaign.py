@@ -4,7 +4,8 @@ counted.
 
 Without an option the sensor and the leads are connected as the firmware assumes, and resistance and map are measured;
 with --turning pole pairs, leads, direction and offset of the sensor are random, and phases, spin and drag are. With
---drive all steps are run with an unknown connection, and each machine is driven with the folder that was written.
+--drive all steps are run with an unknown connection, and each machine is driven with the folder that was written. With
+--other-errors the machines have errors of other kinds, among them harmonics of the angle sensor.
 """
 
 import sys
@@ -26,7 +27,8 @@ FOLDER = ROOT / "tests" / "motors" / "unknown"
 FIRST_SEED = 100
 MAP = ("map rms, % of psi_max", "R, %", "R beyond the sensors' gains, %", "gain balance, %",
        "largest current, % of i_max", "movement, deg")  # fmt: skip
-TURNING = ("wrong connections", "offset, deg", "psi_f, %", "inertia, %", "drag, %")
+TURNING = ("wrong connections", "offset, deg", "psi_f, %", "inertia, %", "drag, %",
+           "harmonics of the angle sensor, deg")  # fmt: skip
 
 
 def draw(machines: int) -> list[tuple[str, int]]:
@@ -55,11 +57,11 @@ def _one(name: str, seed: int, folder: Path) -> tuple[float, ...] | None:
     return reached.map_rms, abs(r_error), abs(r_left), balance, share, moved
 
 
-def _turning(name: str, seed: int, folder: Path) -> tuple[float, ...] | None:
-    """In the order of TURNING: 1 for a wrong connection; offset in degrees; errors; None after a refusal."""
+def _turning(name: str, seed: int, folder: Path, other_errors: bool) -> tuple[float, ...] | None:
+    """In the order of TURNING: 1 for a wrong connection; angles in degrees; errors; None after a refusal."""
     motor = motors.load(str(folder))
     known = nameplate_of(folder, motor)
-    drive, truth = hidden.make(name, seed, motor, known.i_max_A, connected=False)
+    drive, truth = hidden.make(name, seed, motor, known.i_max_A, connected=False, other_errors=other_errors)
     try:
         found = run(drive, chosen(("drag",)), known, lambda _: None)
     except FluxtrueError as error:
@@ -68,26 +70,28 @@ def _turning(name: str, seed: int, folder: Path) -> tuple[float, ...] | None:
     errors = turned(found, truth)
     word = "right" if errors.is_connected else "WRONG"
     click.echo(f"{name:10} {seed}  {word}  offset {errors.offset_deg:+6.3f} deg  psi_f {100 * errors.psi_f:+6.2f} %  "
-               f"J {100 * errors.inertia:+6.2f} %  drag {100 * errors.drag:5.1f} %")  # fmt: skip
+               f"J {100 * errors.inertia:+6.2f} %  drag {100 * errors.drag:5.1f} %  "
+               f"harmonics {errors.harmonics_deg:.4f} deg")  # fmt: skip
     return (float(not errors.is_connected), abs(errors.offset_deg), abs(errors.psi_f), abs(errors.inertia),
-            errors.drag)  # fmt: skip
+            errors.drag, errors.harmonics_deg)  # fmt: skip
 
 
 @click.command()
 @click.option("--machines", type=click.IntRange(min=1), default=40, show_default=True)
 @click.option("--turning", is_flag=True, help="The steps that turn the shaft, with an unknown connection.")
 @click.option("--drive", is_flag=True, help="All steps; then the folder is built and driven.")
-@click.option("--other-errors", is_flag=True, help="With --drive: also errors of kinds that the tool does not know.")
+@click.option("--other-errors", is_flag=True, help="With --turning or --drive: also errors of other kinds.")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="With --drive: folder of the results.")
 @click.option("--fresh", is_flag=True, help="With --drive: throw away the results that are there.")
 def main(machines: int, turning: bool, drive: bool, other_errors: bool, out: Path | None, fresh: bool) -> None:
     """Score hidden machines one after the other."""
-    if (turning and drive) or (not drive and (other_errors or out is not None or fresh)):
-        raise click.UsageError("--other-errors, --out and --fresh belong to --drive, which --turning excludes")
+    if (turning and drive) or (not drive and (out is not None or fresh)) or (other_errors and not (turning or drive)):
+        raise click.UsageError("--out and --fresh belong to --drive, which --turning excludes; --other-errors belongs "
+                               "to either")  # fmt: skip
     drawn = draw(machines)
     if drive:
         sys.exit(0 if _driven(drawn, other_errors, out, fresh) else 1)
-    _scored(drawn, turning)
+    _scored(drawn, turning, other_errors)
 
 
 def _driven(drawn: list[tuple[str, int]], other_errors: bool, out: Path | None, fresh: bool) -> bool:
@@ -100,12 +104,13 @@ def _driven(drawn: list[tuple[str, int]], other_errors: bool, out: Path | None, 
     return met
 
 
-def _scored(drawn: list[tuple[str, int]], turning: bool) -> None:
-    measure, machines = _turning if turning else _one, len(drawn)
-    results = [measure(name, seed, FOLDER) for name, seed in drawn]
+def _scored(drawn: list[tuple[str, int]], turning: bool, other_errors: bool) -> None:
+    machines = len(drawn)
+    results = [_turning(name, seed, FOLDER, other_errors) if turning else _one(name, seed, FOLDER)
+               for name, seed in drawn]  # fmt: skip
     done = np.array([result for result in results if result is not None])
     click.echo(f"{len(done)} of {machines} machines; {machines - len(done)} refused")
-    names, scales = (TURNING, (1.0, 1.0, *(100.0,) * 3)) if turning else (MAP, (*(100.0,) * 5, 1.0))
+    names, scales = (TURNING, (1.0, 1.0, *(100.0,) * 3, 1.0)) if turning else (MAP, (*(100.0,) * 5, 1.0))
     if len(done):
         for name, values in zip(names, (done * scales).T, strict=True):
             click.echo(f"{name}: median {np.median(values):.2f}, 95 % within {np.percentile(values, 95):.2f}, "

@@ -115,7 +115,8 @@ def _connection(name: str, seed: int) -> dict[str, float]:
 
 
 def _other_errors(name: str, seed: int, truth: Truth, motor: Motor, i_max_A: float) -> dict[str, float]:
-    """Errors of kinds that no step of the commissioning knows; of a size that machines and inverters of this size have.
+    """Errors of kinds that the commissioning does not know or only in part (it finds the harmonics of the angle sensor,
+    and assumes another iron loss); of a size that machines and inverters of this size have.
 
     The iron loss is 0.5 to 1.5 % of the machine's power at IRON_RPM, with the largest current half along -d and half
     along q, and all of it is excess loss.

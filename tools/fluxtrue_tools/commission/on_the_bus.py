@@ -37,9 +37,11 @@ def address_of(ecu: VirtualEcu) -> BusAddress:
 
 
 @contextlib.contextmanager
-def hidden_machine(motor: Motor, name: str, seed: int, i_max_A: float, connected: bool = True) -> Iterator[Bench]:
+def hidden_machine(
+    motor: Motor, name: str, seed: int, i_max_A: float, connected: bool = True, other_errors: bool = False
+) -> Iterator[Bench]:
     """A virtual ECU with this machine; connected: sensor and leads are as the firmware assumes."""
-    _, flux_map, plant = hidden.draw(name, seed, motor, i_max_A, connected)
+    _, flux_map, plant = hidden.draw(name, seed, motor, i_max_A, connected, other_errors)
     with contextlib.ExitStack() as stack:
         machine = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "machine.txt"
         machine.write_text(hidden.machine_text(plant, flux_map), encoding="utf-8")

@@ -6,6 +6,7 @@ python -m fluxtrue_tools.commission.over_can --machine saturated --seed 12 --ste
 If a step turns the shaft, sensor and leads are connected at random.
 """
 
+import math
 import time
 
 import click
@@ -16,7 +17,7 @@ from fluxtrue_tools.commission.campaign import FOLDER
 from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.hidden import Truth
 from fluxtrue_tools.commission.nameplate import Nameplate
-from fluxtrue_tools.commission.score import resistance_error, score, turned
+from fluxtrue_tools.commission.score import harmonics_deg, resistance_error, score, turned, waves_rad
 from fluxtrue_tools.commission.steps import Step, chosen, run
 from fluxtrue_tools.sim import motor as motors
 
@@ -29,6 +30,10 @@ def measure(drive: OverTheBus, truth: Truth, known: Nameplate, steps: list[Step]
     if found.followed is not None:
         click.echo(f"connection: {found.followed.connection}, true: {truth.plant['pole_pairs']:.0f} pole pairs, "
                    f"reversed {truth.reversed}, {truth.offset_rad:.4f} rad")  # fmt: skip
+    if found.spun is not None:
+        true = ", ".join(f"{math.degrees(abs(wave)):.3f}" for wave in waves_rad(truth))
+        click.echo(f"harmonics of the angle sensor: wrong by {harmonics_deg(found.spun, truth):.4f} degrees, true: "
+                   f"{true} degrees")  # fmt: skip
     if found.drag is not None:
         click.echo(str(turned(found, truth)))
     if found.resistance is not None:
@@ -43,14 +48,15 @@ def measure(drive: OverTheBus, truth: Truth, known: Nameplate, steps: list[Step]
 @click.option("--machine", default="saturated", show_default=True, help="One of the project's, changed at random.")
 @click.option("--seed", default=12, show_default=True, help="Of these changes.")
 @click.option("--step", "steps", default="map", show_default=True, help="As of `tools/fluxtrue commission`.")
-def main(machine: str, seed: int, steps: str) -> None:
+@click.option("--other-errors", is_flag=True, help="Also errors of other kinds, as harmonics of the angle sensor.")
+def main(machine: str, seed: int, steps: str, other_errors: bool) -> None:
     """Measure the machine and print the errors."""
     wanted = chosen(tuple(steps.split(",")))
     as_assumed = all(step.name != "phases" for step in wanted)
     motor = motors.load(str(FOLDER))
     known = nameplate_of(FOLDER, motor)
-    truth, _, _ = hidden.draw(machine, seed, motor, known.i_max_A, as_assumed)
-    with (on_the_bus.hidden_machine(motor, machine, seed, known.i_max_A, as_assumed) as bench,
+    truth, _, _ = hidden.draw(machine, seed, motor, known.i_max_A, as_assumed, other_errors)
+    with (on_the_bus.hidden_machine(motor, machine, seed, known.i_max_A, as_assumed, other_errors) as bench,
           on_the_bus.connected(bench, motor, known) as drive):  # fmt: skip
         measure(drive, truth, known, wanted)
 

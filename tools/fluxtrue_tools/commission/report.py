@@ -2,13 +2,38 @@
 """commission.txt: what was done and found."""
 
 import math
+from typing import Final
 
 import numpy as np
 
 from fluxtrue_tools.commission import iron
+from fluxtrue_tools.commission.harmonics import LARGE_RAD, Harmonics, Wave
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.steps import Found
 from fluxtrue_tools.motor.map_import.grid import Grid
+
+OFTEN: Final = {1: "once", 2: "twice"}
+SIGMAS: Final = 3.0  # an amplitude with a place
+
+
+def _wave(wave: Wave, order: int) -> str:
+    amplitude, sigma = math.degrees(abs(wave.value_rad)), math.degrees(wave.sigma_rad)
+    said = f"{OFTEN[order]} per turn {amplitude:.2f} ±{sigma:.1g} degrees"
+    place = f", most {math.degrees(wave.phase_rad) / order:.0f} degrees after its zero"
+    return said + (place if amplitude > SIGMAS * sigma else "")
+
+
+def _harmonics(found: Harmonics | None) -> list[str]:
+    if found is None:
+        return ["  harmonics of the angle sensor: not measured"]
+    waves = "; ".join(_wave(wave, order) for order, wave in ((1, found.first), (2, found.second)))
+    lines = [f"  harmonics of the angle sensor, electrical amplitudes: {waves}; three and four times per turn at most "
+             f"{math.degrees(found.further_rad):.2f} degrees"]  # fmt: skip
+    if found.is_large:
+        lines.append(f"  the angle sensor is uneven by more than {math.degrees(LARGE_RAD):.0f} electrical degrees: "
+                     "check how it is mounted (centred, parallel to the shaft, at the right distance, away from "
+                     "magnetic fields), and measure again")  # fmt: skip
+    return lines
 
 
 def _turning(found: Found, known: Nameplate) -> list[str]:
@@ -24,6 +49,7 @@ def _turning(found: Found, known: Nameplate) -> list[str]:
         lines.append(f"magnet: psi_f = {spun.psi_f_Vs:.4g} V·s, ±{spun.psi_f_sigma_Vs:.1g} V·s beyond the sensors' "
                      f"gains; offset of the angle ±{degrees:.1g} degrees; the angle is late by "
                      f"{1e6 * spun.lag_s:.1f} us")  # fmt: skip
+        lines += _harmonics(spun.harmonics)
     if found.drag is not None:
         drag = found.drag
         ends = ", ".join(f"{drag.torque_Nm(np.array(w)):.3g} N·m at {30.0 * w / math.pi:.0f} rpm"

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Errors of the results against a simulated machine: for tests and campaigns, which know the machine."""
 
+import cmath
 import math
 from dataclasses import dataclass
 
@@ -9,6 +10,7 @@ import numpy as np
 from fluxtrue_tools.commission.balance import Balance
 from fluxtrue_tools.commission.hidden import Truth
 from fluxtrue_tools.commission.iron import Iron
+from fluxtrue_tools.commission.spin import Spun
 from fluxtrue_tools.commission.steps import Found
 from fluxtrue_tools.motor.flux_model import FluxModel
 
@@ -62,6 +64,29 @@ def iron_error(found: Iron | None, truth: Truth) -> float:
     return found.per_flux / (true * math.sqrt(found.omega_rad_s)) - 1.0
 
 
+def waves_rad(truth: Truth) -> list[complex]:
+    """The harmonics once and twice per turn of the hidden machine's sensor, as harmonics.py has them: (PL-18) by the
+    shown angle, against which the rotor turns where the sensor is reversed."""
+    plant, found = truth.plant, []
+    zero = plant.get("angle_offset_rad", 0.0) / plant["pole_pairs"]
+    for order in (1, 2):
+        amplitude, phase = (plant.get(f"angle_h{order}_{what}", 0.0) for what in ("rad", "phase"))
+        if plant.get("angle_reversed", 0.0):
+            found.append(cmath.rect(amplitude, 0.5 * math.pi - phase - order * zero))
+        else:
+            found.append(cmath.rect(amplitude, phase - 0.5 * math.pi - order * zero))
+    return found
+
+
+def harmonics_deg(found: Spun, truth: Truth) -> float:
+    """The largest error of the complex amplitudes, electrical; without a measurement NaN."""
+    if found.harmonics is None:
+        return math.nan
+    waves = (found.harmonics.first.value_rad, found.harmonics.second.value_rad)
+    errors = [abs(wave - true) for wave, true in zip(waves, waves_rad(truth), strict=True)]
+    return math.degrees(max(*errors, found.harmonics.further_rad))
+
+
 DRAG_FROM = 0.3  # of the largest speed of the run
 
 
@@ -74,6 +99,7 @@ class Turned:
     psi_f: float  # a share, beyond the gain of the dc voltage's sensor
     inertia: float
     drag: float  # rms of its relative error over the speeds
+    harmonics_deg: float  # electrical, the largest of the complex amplitudes once to four times per turn
 
 
 def turned(found: Found, truth: Truth) -> Turned:
@@ -85,4 +111,5 @@ def turned(found: Found, truth: Truth) -> Turned:
     speeds = np.linspace(DRAG_FROM, 1.0, 15) * drag.to_rad_s
     drags = drag.torque_Nm(speeds) / truth.drag_Nm(speeds) - 1.0
     return Turned(right, offset, found.spun.psi_f_Vs / (truth.psi_f_Vs * plant["vdc_gain"]) - 1.0,
-                  drag.inertia_kgm2 / plant["inertia_kgm2"] - 1.0, float(np.sqrt(np.mean(drags**2))))  # fmt: skip
+                  drag.inertia_kgm2 / plant["inertia_kgm2"] - 1.0, float(np.sqrt(np.mean(drags**2))),
+                  harmonics_deg(found.spun, truth))  # fmt: skip

@@ -2,19 +2,21 @@
 """Angle offset and magnet's flux linkage of a turning machine: (CM-18), (CM-19).
 
 The machine is accelerated to a part of its speed in both directions and coasts there with small currents along d, in
-both polarities. The voltage that does not change its sign with the current is that of the magnet.
+both polarities. The voltage that does not change its sign with the current is that of the magnet. The angle of the same
+windows shows the harmonics of its sensor (harmonics.py).
 """
 
 import cmath
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 
 from fluxtrue_tools.commission import turning
 from fluxtrue_tools.commission.drive import Capture
+from fluxtrue_tools.commission.harmonics import Coasting, Direction, Harmonics, fit, together
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.turning import Connection
 from fluxtrue_tools.errors import FluxtrueError
@@ -46,6 +48,7 @@ class Magnet:
 
     psi_Vs: complex
     omega_rad_s: float  # electrical
+    sensor: Direction | None = None  # its harmonics, if they can be seen
 
     @property
     def error_rad(self) -> float:
@@ -63,6 +66,7 @@ class Spun:
     offset_sigma_rad: float
     lag_s: float  # by which the angle is late; iron losses seem to be a negative one
     omega_rad_s: float  # electrical, at which that was seen
+    harmonics: Harmonics | None = None  # of the angle sensor
 
 
 def reach(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str, currents: Sequence[complex], speed: float,
@@ -229,9 +233,10 @@ def magnet(taken: list[Array], period_s: float, offset_A: complex) -> Magnet:
 def direction(drive: Capture, known: Nameplate, wanted_rad_s: float, _: Connection) -> Magnet:
     """One direction: accelerated, coasting with all levels of the current, and braked."""
     accelerate(drive, known, wanted_rad_s, NAME, TURNED)
-    found = magnet(_coast(drive, known), drive.period_s, known.offset_A)
+    taken = _coast(drive, known)
+    found = magnet(taken, drive.period_s, known.offset_A)
     brake(drive, known, wanted_rad_s, NAME)
-    return found
+    return replace(found, sensor=fit([Coasting(rows[:, 5], rows[:, 1], drive.period_s) for rows in taken]))
 
 
 def measure(drive: D, known: Nameplate, rough: Connection,
@@ -256,12 +261,22 @@ def measure(drive: D, known: Nameplate, rough: Connection,
             f"commission: {NAME}: the offset of the angle still changes by "
             f"{math.degrees(_error_rad(ways)):.2g} electrical degrees: the angle sensor is not reliable"
         )
-    return _together(rounds)
+    found = _together(rounds)
+    return replace(found, harmonics=_harmonics([way for _, both in rounds for way in both], found, known))
 
 
 def _error_rad(ways: list[Magnet]) -> float:
     """The mean of both directions: a lag of the sensor turns with the speed."""
     return 0.5 * (ways[0].error_rad + ways[1].error_rad)
+
+
+def _harmonics(ways: list[Magnet], found: Spun, known: Nameplate) -> Harmonics | None:
+    """Of all directions: an offset of the angle, which the first round still had, is no harmonic."""
+    sensors = [way.sensor for way in ways if way.sensor is not None]
+    if len(sensors) < len(ways):
+        return None
+    pole_pairs = found.connection.pole_pairs
+    return together(sensors, pole_pairs, 1.5 * pole_pairs * found.psi_f_Vs, known.inertia_kgm2)
 
 
 def _together(rounds: list[tuple[Connection, list[Magnet]]]) -> Spun:

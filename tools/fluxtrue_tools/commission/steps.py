@@ -169,7 +169,7 @@ STEPS = (
     Step(connection.NAME, "a current of up to {vector:.3g} A that does not turn with the rotor: the shaft turns "
          "slowly, by up to {turns:g} turns divided by the pole pairs, and back", _phases, 10.0, 20.0),
     Step(spin.NAME, "the shaft turns at up to {speed:.0f} rpm in both directions, with up to {torque:.3g} A of current "
-         "that makes torque", _spin, 20.0, 150.0),
+         "that makes torque", _spin, 20.0, 165.0),
     Step(drag.NAME, "the shaft is accelerated to {speed:.0f} rpm, runs down and is braked, with up to {torque:.3g} A",
          _drag, 10.0, 25.0),
     Step("resistance", "direct currents up to {level:.3g} A along the magnet for {level_s:.1f} s; no torque",

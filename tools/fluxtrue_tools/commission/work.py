@@ -17,6 +17,7 @@ import numpy as np
 from fluxtrue_tools.commission.bursts import Raw
 from fluxtrue_tools.commission.connection import Followed
 from fluxtrue_tools.commission.drag import Drag
+from fluxtrue_tools.commission.harmonics import Harmonics, Wave
 from fluxtrue_tools.commission.levels import Resistance
 from fluxtrue_tools.commission.plan import First
 from fluxtrue_tools.commission.spin import Spun
@@ -26,7 +27,8 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.outputs import atomic
 
 NAME: Final = "steps.json"
-TYPES: Final = {kind.__name__: kind for kind in (Connection, Followed, Spun, Drag, Resistance, First, Raw)}
+TYPES: Final = {kind.__name__: kind
+               for kind in (Connection, Followed, Wave, Harmonics, Spun, Drag, Resistance, First, Raw)}  # fmt: skip
 KEPT: Final = ("offset_A", "offset_sigma_A", "followed", "spun", "drag", "resistance", "first", "levels")  # of Found
 LAST: Final = "map"
 

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from fluxtrue_tools.commission import connection, plan
+from fluxtrue_tools.commission.harmonics import LARGE_RAD, Harmonics
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.steps import Found
 
@@ -15,7 +16,7 @@ TITLES: Final = {"offsets": "Current sensors at rest", "phases": "Leads, angle s
                  "resistance": "Resistance and inverter", "map": "Flux map"}  # fmt: skip
 # What tests/commission requires of hidden machines.
 OFFSET_SHARE, R_SHARE, MAP_SHARE, GAIN_SHARE = 0.001, 0.01, 0.01, 0.002
-ANGLE_DEG, PSI_SHARE, INERTIA_SHARE, DRAG_SHARE = 0.2, 0.005, 0.03, 0.1
+ANGLE_DEG, HARMONIC_DEG, PSI_SHARE, INERTIA_SHARE, DRAG_SHARE = 0.2, 0.2, 0.005, 0.03, 0.1
 
 Row = tuple[str, str, str, str]  # what, found, ±, bound
 
@@ -46,6 +47,19 @@ def _phases(found: Found, known: Nameplate, _: float) -> list[Row]:
     ]  # fmt: skip
 
 
+def _harmonics(found: Harmonics | None) -> list[Row]:
+    if found is None:
+        return [("Harmonics of the angle sensor", "not measured", "", "")]
+    rows = [(f"Harmonic of the angle sensor {often} per turn, electrical", f"{math.degrees(abs(wave.value_rad)):.2f}°",
+             f"{math.degrees(wave.sigma_rad):.1g}°", f"± at most {HARMONIC_DEG:g}°")
+            for often, wave in (("once", found.first), ("twice", found.second))]  # fmt: skip
+    rows.append(("The larger of three and four times per turn", f"{math.degrees(found.further_rad):.2f}°", "",
+                 f"± at most {HARMONIC_DEG:g}°"))  # fmt: skip
+    if found.is_large:
+        rows.append(("Check how the angle sensor is mounted", f"more than {math.degrees(LARGE_RAD):.0f}°", "", ""))
+    return rows
+
+
 def _spin(found: Found, known: Nameplate, _: float) -> list[Row]:
     assert found.spun is not None
     spun = found.spun
@@ -57,6 +71,7 @@ def _spin(found: Found, known: Nameplate, _: float) -> list[Row]:
         ("Electrical angle at the sensor's zero", f"{math.degrees(spun.connection.offset_rad):.2f}°",
          f"{math.degrees(spun.offset_sigma_rad):.1g}°", f"± at most {ANGLE_DEG:g}°"),
         ("The angle is late by", f"{1e6 * spun.lag_s:.1f} µs", "", ""),
+        *_harmonics(spun.harmonics),
         ("Speed of the measurement", f"{rpm:.0f} rpm", "", "both directions"),
     ]  # fmt: skip
 
