@@ -134,15 +134,13 @@ static FX_NOT_INLINED void record(capture_t *capture, int16_t *memory, const sam
     const uint32_t readable = lesser((newest - capture->next) / capture->config.divisor + 1U, capture->run);
     const sample_t *next = &slot[capture->next % SAMPLE_SLOTS];
     const uint32_t count = armed ? trigger_search(capture, next, readable) : lesser(readable, capture->remaining);
-    if (count > 0U) { /* else the search ends with the next sample */
+    if (count > 0U) { /* else the trigger is the next sample */
         take(capture, memory, next, count);
     }
     if (!armed) {
         count_triggered(capture, count);
-    } else if (count < readable && trigger_is_found(capture)) {
+    } else if (count < readable) {
         begin_after(capture);
-    } else {
-        /* the next step, or the next pass of this one, continues the search */
     }
 }
 

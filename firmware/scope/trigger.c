@@ -59,30 +59,6 @@ static FX_NOT_INLINED uint32_t count_until(const condition_t *condition, uint32_
     return k;
 }
 
-/* The same in the samples of successive periods, from the first. The conjunction of several differences is negative if
- * all are: they are searched with one branch. */
-static inline FX_INLINED_IF_OPTIMISED uint32_t count_until_in_periods(const condition_t *condition, uint32_t count)
-{
-    const uint8_t *value = condition->values.from;
-    uint32_t left = count;
-    for (; left >= SEARCHED_AT_ONCE; left -= SEARCHED_AT_ONCE) {
-        int32_t signs = beyond(condition, value);
-        FX_UNROLLED
-        for (uint32_t j = 1; j < SEARCHED_AT_ONCE; j++) {
-            signs &= beyond(condition, &value[j * sizeof(sample_t)]);
-        }
-        if (signs >= 0) {
-            break;
-        }
-        value = &value[SEARCHED_AT_ONCE * sizeof(sample_t)];
-    }
-    while (left > 0U && beyond(condition, value) < 0) {
-        value = &value[sizeof(sample_t)];
-        left--;
-    }
-    return count - left;
-}
-
 /* Passes over the samples that must lie before the trigger; the last one counts, because an edge may follow it. */
 static uint32_t pass_over(capture_t *capture, column_t values, uint32_t count)
 {
@@ -145,25 +121,53 @@ static FX_NOT_INLINED uint32_t search_any(capture_t *capture, const sample_t *ne
     return until;
 }
 
-static FX_NOT_INLINED uint32_t search_samples(const capture_t *capture, const sample_t *next, uint32_t count)
+/* Where the trigger is, after a search that has ended before the sample `found`: if that is only the other side of an
+ * edge's level, later. */
+static uint32_t search_on(capture_t *capture, const sample_t *next, uint32_t found, uint32_t count)
+{
+    return (found == count || capture->ready) ? found : search_any(capture, next, count);
+}
+
+static FX_NOT_INLINED uint32_t search_samples(capture_t *capture, const sample_t *next, uint32_t count)
 {
     const condition_t condition = awaited(capture, column_of_trigger(capture, next));
-    return count_until(&condition, 0, count);
+    return search_on(capture, next, count_until(&condition, 0, count), count);
 }
 
 /* A value of the step is the same in all of its periods. */
-static inline uint32_t search_step(const capture_t *capture, uint32_t count)
+static inline uint32_t search_step(capture_t *capture, const sample_t *next, uint32_t count)
 {
     const condition_t condition = awaited(capture, column_of_step(capture, capture->trigger_place));
-    return (beyond(&condition, condition.values.from) < 0) ? count : 0U;
+    return (beyond(&condition, condition.values.from) < 0) ? count : search_on(capture, next, 0, count);
 }
 
-static inline FX_INLINED_IF_OPTIMISED uint32_t search_periods(const capture_t *capture, const sample_t *next,
-                                                              uint32_t count)
+/* In the samples of successive periods. The conjunction of several differences is negative if all are: they are
+ * searched with one branch. */
+static inline FX_INLINED_IF_OPTIMISED uint32_t search_periods(capture_t *capture, const sample_t *next, uint32_t count)
 {
     const column_t values = {(const uint8_t *)next + capture->trigger_place, sizeof(sample_t)};
     const condition_t condition = awaited(capture, values);
-    return count_until_in_periods(&condition, count);
+    const uint8_t *value = values.from;
+    uint32_t left = count;
+    for (; left >= SEARCHED_AT_ONCE; left -= SEARCHED_AT_ONCE) {
+        int32_t signs = beyond(&condition, value);
+        FX_UNROLLED
+        for (uint32_t j = 1; j < SEARCHED_AT_ONCE; j++) {
+            signs &= beyond(&condition, &value[j * sizeof(sample_t)]);
+        }
+        if (signs >= 0) {
+            break;
+        }
+        value = &value[SEARCHED_AT_ONCE * sizeof(sample_t)];
+    }
+    while (left > 0U) {
+        if (beyond(&condition, value) >= 0) {
+            return search_on(capture, next, count - left, count);
+        }
+        value = &value[sizeof(sample_t)];
+        left--;
+    }
+    return count;
 }
 
 uint32_t trigger_search(capture_t *capture, const sample_t *next, uint32_t count)
@@ -172,15 +176,8 @@ uint32_t trigger_search(capture_t *capture, const sample_t *next, uint32_t count
         return search_periods(capture, next, count);
     }
     if (capture->search == (uint8_t)SEARCH_STEP) {
-        return search_step(capture, count);
+        return search_step(capture, next, count);
     }
     return (capture->search == (uint8_t)SEARCH_SAMPLES) ? search_samples(capture, next, count)
                                                         : search_any(capture, next, count);
-}
-
-bool trigger_is_found(capture_t *capture)
-{
-    const bool found = capture->search == (uint8_t)SEARCH_ANY || capture->ready;
-    set_ready(capture, true);
-    return found;
 }

@@ -11,11 +11,8 @@
 
 /** Before an edge can trigger, the signal must have been on the other side of the level. */
 void trigger_reset(capture_t *capture);
-/** The samples before the one that ends the search, from the next period on; `count` if it is not among as many. The
- * search begins when enough samples lie before it; a command or a fault is not kept waiting. */
+/** The samples before the trigger, from the next period on; `count` if it is not among as many. The search begins when
+ * enough samples lie before it; a command or a fault is not kept waiting. */
 uint32_t trigger_search(capture_t *capture, const sample_t *next, uint32_t count);
-/** What has ended the search is the trigger. False, once: it was the other side of an edge's level, and the samples from
- * there on are to be searched. */
-bool trigger_is_found(capture_t *capture);
 
 #endif
