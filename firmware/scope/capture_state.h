@@ -52,10 +52,12 @@ typedef enum {
 
 /** What an armed capture waits for in its next samples. */
 typedef enum {
-    SEARCH_ANY = 0,
-    SEARCH_PERIODS = 1, /* nothing but a level, or one side of it before an edge, in the samples of every period */
-    SEARCH_SAMPLES = 2, /* the same with a divisor */
-    SEARCH_STEP = 3     /* the same in a value of the step */
+    SEARCH_PERIODS = 0, /* nothing but a level, or one side of it before an edge, in the samples of every period */
+    SEARCH_SAMPLES = 1, /* the same with a divisor */
+    SEARCH_STEP = 2,    /* the same in a value of the step */
+    SEARCH_ANY = 3,
+    SEARCH_LATER = 4, /* nothing before enough samples lie before the trigger */
+    SEARCH_NOT = 5    /* a command or a fault */
 } capture_search_t;
 
 #define GATHER_CLOSED 0xFFU

@@ -103,8 +103,14 @@ static uint32_t until_trigger(capture_t *capture, column_t values, uint32_t coun
 static capture_search_t search_of(const capture_t *capture)
 {
     const capture_config_t *config = &capture->config;
-    if (capture->asked || capture->filled < config->before || config->trigger < TRIGGER_RISING) {
+    if (capture->asked) {
         return SEARCH_ANY;
+    }
+    if (capture->filled < config->before) {
+        return SEARCH_LATER;
+    }
+    if (config->trigger < TRIGGER_RISING) {
+        return SEARCH_NOT;
     }
     if (is_of_step(capture->trigger_place)) {
         return SEARCH_STEP;
@@ -121,14 +127,13 @@ static FX_NOT_INLINED uint32_t search_any(capture_t *capture, const sample_t *ne
     return until;
 }
 
-/* Where the trigger is, after a search that has ended before the sample `found`: if that is only the other side of an
- * edge's level, later. */
+/* If a search has ended before the sample `found`, there is the trigger, or only the other side of an edge's level. */
 static uint32_t search_on(capture_t *capture, const sample_t *next, uint32_t found, uint32_t count)
 {
     return (found == count || capture->ready) ? found : search_any(capture, next, count);
 }
 
-static FX_NOT_INLINED uint32_t search_samples(capture_t *capture, const sample_t *next, uint32_t count)
+static uint32_t search_samples(capture_t *capture, const sample_t *next, uint32_t count)
 {
     const condition_t condition = awaited(capture, column_of_trigger(capture, next));
     return search_on(capture, next, count_until(&condition, 0, count), count);
@@ -139,6 +144,17 @@ static inline uint32_t search_step(capture_t *capture, const sample_t *next, uin
 {
     const condition_t condition = awaited(capture, column_of_step(capture, capture->trigger_place));
     return (beyond(&condition, condition.values.from) < 0) ? count : search_on(capture, next, 0, count);
+}
+
+/* All of these samples lie before the trigger, and the last one that must do so is not among them. */
+static inline uint32_t search_later(capture_t *capture, const sample_t *next, uint32_t count)
+{
+    const uint32_t filled = capture->filled + count;
+    if (filled >= capture->config.before) {
+        return search_any(capture, next, count);
+    }
+    capture->filled = (uint16_t)filled;
+    return count;
 }
 
 /* In the samples of successive periods. The conjunction of several differences is negative if all are: they are
@@ -170,14 +186,21 @@ static inline FX_INLINED_IF_OPTIMISED uint32_t search_periods(capture_t *capture
     return count;
 }
 
-uint32_t trigger_search(capture_t *capture, const sample_t *next, uint32_t count)
+/* Not inlined: the search in the samples of every period needs fewer registers without it. */
+static FX_NOT_INLINED uint32_t search_otherwise(capture_t *capture, const sample_t *next, uint32_t count)
 {
-    if (capture->search == (uint8_t)SEARCH_PERIODS) {
-        return search_periods(capture, next, count);
+    if (capture->search >= (uint8_t)SEARCH_LATER) {
+        return (capture->search == (uint8_t)SEARCH_LATER) ? search_later(capture, next, count) : count;
     }
     if (capture->search == (uint8_t)SEARCH_STEP) {
         return search_step(capture, next, count);
     }
     return (capture->search == (uint8_t)SEARCH_SAMPLES) ? search_samples(capture, next, count)
                                                         : search_any(capture, next, count);
+}
+
+uint32_t trigger_search(capture_t *capture, const sample_t *next, uint32_t count)
+{
+    return (capture->search == (uint8_t)SEARCH_PERIODS) ? search_periods(capture, next, count)
+                                                        : search_otherwise(capture, next, count);
 }

@@ -11,7 +11,8 @@
 #include "hal/s32k144/registers.h"
 
 #define VALUE_SIZE 2U
-#define OTHER_BANK HAL_GATHER_COLUMNS
+#define OTHER_BANK HAL_GATHER_COLUMNS /* its first channel */
+#define BANK_SIZE (OTHER_BANK * (uint32_t)sizeof(channel_t))
 #define LINK ((uint32_t)DMA_TCD0_CSR_MAJORELINK | DMA_TCD0_CSR_MAJORLINKCH_MASK)
 #define HALF_WORDS (DMA_TCD0_ATTR_SSIZE(1) | DMA_TCD0_ATTR_DSIZE(1))
 
@@ -41,14 +42,20 @@ OFFSET(BITER, TCD0_BITER_ELINKNO);
 _Static_assert(sizeof(channel_t) == offsetof(dma_t, TCD1_SADDR) - offsetof(dma_t, TCD0_SADDR), "channels");
 
 static struct {
-    uint8_t last; /* channel of a bank */
-    uint8_t bank; /* its first channel: of the next part, or of the one that was added last */
-    bool started; /* since the set-up */
+    uint16_t bank; /* 0 or BANK_SIZE: of the next part, or of the one that was added last */
+    uint8_t last;  /* channel of a bank */
+    bool started;  /* since the set-up */
 } state;
 
 static inline channel_t *channels(void)
 {
     return (channel_t *)(void *)&DMA->TCD0_SADDR;
+}
+
+/* By its offset in bytes, which is a shift less than by its number. */
+static inline channel_t *bank_at(uint32_t offset)
+{
+    return (channel_t *)(void *)((uint8_t *)channels() + offset);
 }
 
 static inline uint32_t link_to(uint32_t k)
@@ -65,7 +72,7 @@ static void set_status(channel_t *channel, uint32_t status)
 
 bool hal_gather_is_idle(void)
 {
-    return !state.started || (channels()[state.bank + state.last].CSR & DMA_TCD0_CSR_DONE) != 0U;
+    return !state.started || (bank_at(state.bank)[state.last].CSR & DMA_TCD0_CSR_DONE) != 0U;
 }
 
 static void set_up_channel(uint32_t k, uint32_t link, uint32_t stride, uint32_t row_size)
@@ -95,9 +102,9 @@ void hal_gather_set_up(uint32_t columns, const uint32_t *stride, uint32_t row_si
 void hal_gather_move(uint32_t column, const void *from, int16_t *to)
 {
     if (column == 0U) {
-        state.bank = (uint8_t)(state.bank ^ OTHER_BANK);
+        state.bank = (uint16_t)(state.bank ^ BANK_SIZE);
     }
-    channel_t *channel = &channels()[state.bank + column];
+    channel_t *channel = &bank_at(state.bank)[column];
     channel->SADDR = (uint32_t)(uintptr_t)from;
     channel->DADDR = (uint32_t)(uintptr_t)to;
 }
@@ -105,7 +112,7 @@ void hal_gather_move(uint32_t column, const void *from, int16_t *to)
 /* Also the channels that are not used get their number of bytes: that is shorter than counting them. */
 void hal_gather_add(uint32_t count, bool is_further)
 {
-    channel_t *bank = &channels()[state.bank];
+    channel_t *bank = bank_at(state.bank);
     FX_ADDRESS_ONCE(bank);
     FX_UNROLLED
     for (uint32_t k = 0; k < HAL_GATHER_COLUMNS; k++) {
@@ -113,13 +120,13 @@ void hal_gather_add(uint32_t count, bool is_further)
     }
     bank[state.last].CSR = 0; /* neither DONE nor a link */
     if (is_further) {
-        channels()[(state.bank ^ OTHER_BANK) + state.last].CSR = (uint16_t)link_to(state.bank);
+        bank_at(state.bank ^ BANK_SIZE)[state.last].CSR = (uint16_t)link_to((state.bank == 0U) ? 0U : OTHER_BANK);
     }
 }
 
 void hal_gather_start(uint32_t parts)
 {
-    channel_t *first = &channels()[(parts > 1U) ? state.bank ^ OTHER_BANK : state.bank];
+    channel_t *first = bank_at((parts > 1U) ? state.bank ^ BANK_SIZE : state.bank);
     state.started = true;
     __asm__ volatile("dmb" ::: "memory"); /* the DMA reads what the task has stored before */
     set_status(first, (first->CSR & LINK) | DMA_TCD0_CSR_START);

@@ -261,11 +261,11 @@ TOO_EARLY, REFUSED = "idle too early", "DMA channel 8 starts: NBYTES"
 START = "set_status(first, (first->CSR & LINK) | DMA_TCD0_CSR_START)"
 STATUS = "set_status(channel, link)"
 CLEARED = "bank[state.last].CSR = 0;"
-FURTHER = ".CSR = (uint16_t)link_to(state.bank)"
+FURTHER = "link_to((state.bank == 0U) ? 0U : OTHER_BANK)"
 SECOND_BANK = """
         set_up_channel(OTHER_BANK + k, is_last ? 0U : link_to(OTHER_BANK + k + 1U), stride[k], row_size);"""
-FIRST = "(parts > 1U) ? state.bank ^ OTHER_BANK : state.bank"
-LAST = "channels()[state.bank + state.last].CSR & DMA"
+FIRST = "(parts > 1U) ? state.bank ^ BANK_SIZE : state.bank"
+LAST = "bank_at(state.bank)[state.last].CSR & DMA"
 PLANTED = (
     PlantedError("DONE not cleared in start", START,
                  "first->CSR = (uint16_t)((first->CSR & LINK) | DMA_TCD0_CSR_START)", NEVER_IDLE),
@@ -276,15 +276,15 @@ PLANTED = (
     PlantedError("last status cleared only of a link", CLEARED,
                  "if ((bank[state.last].CSR & DMA_TCD0_CSR_DONE) == 0U) {\n        bank[state.last].CSR = 0;\n    }",
                  IDLE_AT_ONCE),
-    PlantedError("no link to the further part", FURTHER, ".CSR = 0", NEVER_IDLE),
-    PlantedError("a link to the first part again", FURTHER, ".CSR = (uint16_t)link_to(state.bank ^ OTHER_BANK)",
+    PlantedError("no link to the further part", FURTHER, "0U", NEVER_IDLE),
+    PlantedError("a link to the first part again", FURTHER, "link_to((state.bank == 0U) ? OTHER_BANK : 0U)",
                  NEVER_IDLE),
-    PlantedError("starts the other bank", FIRST, "(parts > 1U) ? state.bank : state.bank ^ OTHER_BANK", NEVER_IDLE),
-    PlantedError("adds to the other bank", "channel_t *bank = &channels()[state.bank];",
-                 "channel_t *bank = &channels()[state.bank ^ OTHER_BANK];", DIFFERS),
-    PlantedError("links from the bank itself", "channels()[(state.bank ^ OTHER_BANK) + state.last]",
-                 "channels()[state.bank + state.last]", NEVER_IDLE),
-    PlantedError("moves without another bank", "state.bank = (uint8_t)(state.bank ^ OTHER_BANK);", "", DIFFERS),
+    PlantedError("starts the other bank", FIRST, "(parts > 1U) ? state.bank : state.bank ^ BANK_SIZE", NEVER_IDLE),
+    PlantedError("adds to the other bank", "channel_t *bank = bank_at(state.bank);",
+                 "channel_t *bank = bank_at(state.bank ^ BANK_SIZE);", DIFFERS),
+    PlantedError("links from the bank itself", "bank_at(state.bank ^ BANK_SIZE)[state.last]",
+                 "bank_at(state.bank)[state.last]", NEVER_IDLE),
+    PlantedError("moves without another bank", "state.bank = (uint16_t)(state.bank ^ BANK_SIZE);", "", DIFFERS),
     PlantedError("starts the first bank always", FIRST, "0U", NEVER_IDLE),
     PlantedError("starts the last part only", FIRST, "state.bank", DIFFERS),
     PlantedError("values instead of bytes", "count * VALUE_SIZE", "count", REFUSED),
@@ -294,7 +294,7 @@ PLANTED = (
     PlantedError("constant offset of the destination", "(uint16_t)row_size", "VALUE_SIZE", DIFFERS),
     PlantedError("never started", "state.started = true;", "", IDLE_AT_ONCE),
     PlantedError("started before the set-up", "    state.started = false;\n", "", "not idle after the set-up"),
-    PlantedError("idle after the first column", LAST, "channels()[state.bank].CSR & DMA", TOO_EARLY),
+    PlantedError("idle after the first column", LAST, "bank_at(state.bank)[0].CSR & DMA", TOO_EARLY),
     PlantedError("reads the first bank only", LAST, "channels()[state.last].CSR & DMA", NEVER_IDLE),
     PlantedError("last column left out", "(columns - 1U)", "(columns - 2U + (columns < 2U))", DIFFERS),
     PlantedError("second bank not set up", SECOND_BANK, "", NEVER_IDLE),

@@ -566,7 +566,7 @@ void test_what_is_searched_without_other_tests(void)
 {
     arm_for(TRIGGER_ABOVE, NEVER);
     run_steps(2);
-    TEST_ASSERT_EQUAL(SEARCH_ANY, capture.search); /* 20 samples, and 25 must lie before */
+    TEST_ASSERT_EQUAL(SEARCH_LATER, capture.search); /* 20 samples, and 25 must lie before */
     run_steps(1);
     TEST_ASSERT_EQUAL(SEARCH_PERIODS, capture.search);
     capture_trigger(&capture, newest + 4U);
@@ -577,7 +577,7 @@ void test_what_is_searched_without_other_tests(void)
     TEST_ASSERT_FALSE(capture.ready);
     arm_for(TRIGGER_MANUAL, 0);
     run_steps(10);
-    TEST_ASSERT_EQUAL(SEARCH_ANY, capture.search);
+    TEST_ASSERT_EQUAL(SEARCH_NOT, capture.search);
     config.divisor = 2;
     arm_for(TRIGGER_ABOVE, NEVER);
     run_steps(10);
