@@ -5,6 +5,7 @@ counted.
 Without an option the sensor and the leads are connected as the firmware assumes, and resistance and map are measured;
 with --turning pole pairs, leads, direction and offset of the sensor are random, and phases, spin and drag are. With
 --drive all steps are run with an unknown connection, and each machine is driven with the folder that was written.
+With --nameplate unknown_48V the machines are small ones, of the kinds that SMALL names.
 """
 
 import sys
@@ -22,16 +23,20 @@ from fluxtrue_tools.sim import motor as motors
 from fluxtrue_tools.sim.build import ROOT
 
 KINDS = ("hsm1", "saturated", "pmasynrm", "linear", "leaf")
-FOLDER = ROOT / "tests" / "motors" / "unknown"
+SMALL = ("hub", "anaheim", "ebike")  # surface magnets for 48 V: psi_f of 4.0, 0.7 and 2.8 times L i_max
+MOTORS = ROOT / "tests" / "motors"
+FOLDER, SMALL_FOLDER = MOTORS / "unknown", MOTORS / "unknown_48V"
+NAMEPLATES = {FOLDER.name: KINDS, SMALL_FOLDER.name: SMALL}
 FIRST_SEED = 100
 MAP = ("map rms, % of psi_max", "R, %", "R beyond the sensors' gains, %", "gain balance, %",
        "largest current, % of i_max", "movement, deg")  # fmt: skip
 TURNING = ("wrong connections", "offset, deg", "psi_f, %", "inertia, %", "drag, %")
 
 
-def draw(machines: int) -> list[tuple[str, int]]:
-    """Name and seed of so many hidden machines, of all kinds in turn."""
-    return [(KINDS[k % len(KINDS)], FIRST_SEED + k) for k in range(machines)]
+def draw(machines: int, nameplate: str = FOLDER.name) -> list[tuple[str, int]]:
+    """Name and seed of so many hidden machines, of all kinds of a nameplate in turn."""
+    kinds = NAMEPLATES[nameplate]
+    return [(kinds[k % len(kinds)], FIRST_SEED + k) for k in range(machines)]
 
 
 def _one(name: str, seed: int, folder: Path) -> tuple[float, ...] | None:
@@ -75,34 +80,37 @@ def _turning(name: str, seed: int, folder: Path) -> tuple[float, ...] | None:
 
 @click.command()
 @click.option("--machines", type=click.IntRange(min=1), default=40, show_default=True)
+@click.option("--nameplate", type=click.Choice(list(NAMEPLATES)), default=FOLDER.name, show_default=True)
 @click.option("--turning", is_flag=True, help="The steps that turn the shaft, with an unknown connection.")
 @click.option("--drive", is_flag=True, help="All steps; then the folder is built and driven.")
 @click.option("--other-errors", is_flag=True, help="With --drive: also errors of kinds that the tool does not know.")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="With --drive: folder of the results.")
 @click.option("--fresh", is_flag=True, help="With --drive: throw away the results that are there.")
-def main(machines: int, turning: bool, drive: bool, other_errors: bool, out: Path | None, fresh: bool) -> None:
+def main(machines: int, nameplate: str, turning: bool, drive: bool, other_errors: bool, out: Path | None,
+         fresh: bool) -> None:  # fmt: skip
     """Score hidden machines one after the other."""
     if (turning and drive) or (not drive and (other_errors or out is not None or fresh)):
         raise click.UsageError("--other-errors, --out and --fresh belong to --drive, which --turning excludes")
-    drawn = draw(machines)
+    drawn, folder = draw(machines, nameplate), MOTORS / nameplate
     if drive:
-        sys.exit(0 if _driven(drawn, other_errors, out, fresh) else 1)
-    _scored(drawn, turning)
+        sys.exit(0 if _driven(folder, drawn, other_errors, out, fresh) else 1)
+    _scored(folder, drawn, turning)
 
 
-def _driven(drawn: list[tuple[str, int]], other_errors: bool, out: Path | None, fresh: bool) -> bool:
+def _driven(folder: Path, drawn: list[tuple[str, int]], other_errors: bool, out: Path | None, fresh: bool) -> bool:
     """Whether every bound is met."""
-    job = proof.Job(FOLDER, other_errors)
-    place = out or ROOT / "build" / "commission" / ("other-errors" if other_errors else "driven")
+    job = proof.Job(folder, other_errors)
+    results = ("other-errors" if other_errors else "driven") + ("" if folder == FOLDER else f"-{folder.name}")
+    place = out or ROOT / "build" / "commission" / results
     table = proof.campaign(job, drawn, place, fresh, click.echo)
     text, met = proof.report(job, table, place)
     click.echo(text, nl=False)
     return met
 
 
-def _scored(drawn: list[tuple[str, int]], turning: bool) -> None:
+def _scored(folder: Path, drawn: list[tuple[str, int]], turning: bool) -> None:
     measure, machines = _turning if turning else _one, len(drawn)
-    results = [measure(name, seed, FOLDER) for name, seed in drawn]
+    results = [measure(name, seed, folder) for name, seed in drawn]
     done = np.array([result for result in results if result is not None])
     click.echo(f"{len(done)} of {machines} machines; {machines - len(done)} refused")
     names, scales = (TURNING, (1.0, 1.0, *(100.0,) * 3)) if turning else (MAP, (*(100.0,) * 5, 1.0))
