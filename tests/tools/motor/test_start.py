@@ -11,12 +11,14 @@ from fluxtrue_tools.motor.start import guess
 from fluxtrue_tools.sim.build import ROOT
 
 UNKNOWN = ["--i-max", "250", "--vdc", "350", "--pwm", "10", "--pole-pairs", "4", "--speed-max", "9000"]
+SMALL = ["--i-max", "50", "--vdc", "48", "--pwm", "20", "--pole-pairs", "4", "--speed-max", "3000"]
 
 
-def test_the_folder_of_the_tests_is_what_the_command_makes(tmp_path: Path) -> None:
-    assert run(["motor", "start", *UNKNOWN, "--out", str(tmp_path / "unknown")]) == 0
-    made = (tmp_path / "unknown" / "motor.toml").read_text(encoding="utf-8")
-    kept = (ROOT / "tests" / "motors" / "unknown" / "motor.toml").read_text(encoding="utf-8")
+@pytest.mark.parametrize(("name", "nameplate"), [("unknown", UNKNOWN), ("unknown_48V", SMALL)])
+def test_the_folders_of_the_tests_are_what_the_command_makes(name: str, nameplate: list[str], tmp_path: Path) -> None:
+    assert run(["motor", "start", *nameplate, "--out", str(tmp_path / name)]) == 0
+    made = (tmp_path / name / "motor.toml").read_text(encoding="utf-8")
+    kept = (ROOT / "tests" / "motors" / name / "motor.toml").read_text(encoding="utf-8")
     assert kept == "# SPDX-License-Identifier: Apache-2.0\n" + made
 
 

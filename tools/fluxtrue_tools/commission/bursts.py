@@ -119,26 +119,42 @@ def _shift(drive: Capture, known: Nameplate) -> complex:
 
 
 def _brake(drive: Capture, known: Nameplate) -> None:
-    """The alternating torque leaves some speed: a small current along q takes it away."""
+    """The alternating torque leaves some speed: a small current along q takes it away. A rotor that is much lighter
+    than the guess would swing about standstill: each reversal halves its current."""
     drive.push(0j)
+    strength, before = 1.0, 0.0
     for _ in range(BRAKE_STEPS):
         speed = drive.speed_rpm(BRAKE_S)
         if abs(speed) < STANDING_RPM:
             break
-        drive.push(1j * known.brake_A(speed), known.offset_A)
-    drive.let_go()
+        strength *= 0.5 if drive.is_light and speed * before < 0.0 else 1.0
+        drive.push(1j * strength * known.brake_A(speed), known.offset_A)
+        before = speed
+    _rest(drive, known)
+
+
+def _rest(drive: Capture, known: Nameplate) -> None:
+    """The currents return to zero. What the drive takes for zero has the offsets of the sensors, which in REST_S turn a
+    light rotor further than a start of the pulses allows."""
+    if drive.is_light:
+        drive.push(0j, known.offset_A)
+        drive.rest(REST_S)
+        drive.let_go()
+    else:
+        drive.let_go()
+        drive.rest(REST_S)
 
 
 def _started(drive: Capture, burst: Burst, known: Nameplate) -> Array:
     """The rows of a burst. A step of the angle sensor is a jump of the measured speed, with which the firmware refuses
-    a start even at a standstill: it is tried again."""
+    a start even at a standstill: it is tried again. From then on the rotor is held as one that moves easily."""
     for _ in range(STARTS):
         _brake(drive, known)
-        drive.rest(REST_S)
         allowed = replace(burst, angle_deg=known.swing_deg)
         rows = drive.pulse(allowed.shifted(_shift(drive, known)).values())
         if _phase_word(drive) != REFUSED or drive.get("fault_word"):
             break
+        drive.is_light = True
     return rows
 
 

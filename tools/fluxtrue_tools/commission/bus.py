@@ -98,6 +98,7 @@ class OverTheBus:
     switched_off: tuple[str, ...] = ()  # the trim acts while the shaft turns
     settings: tuple[str, ...] = ("dead_time_compensation",)
     slower: float = 12.0
+    is_light: bool = False
 
     def __init__(self, line: Line, description: Description, known: Nameplate, vdc_V: float) -> None:
         self._line, self._known, self._description = line, known, description

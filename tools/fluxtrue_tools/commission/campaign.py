@@ -5,7 +5,8 @@ counted.
 Without an option the sensor and the leads are connected as the firmware assumes, and resistance and map are measured;
 with --turning pole pairs, leads, direction and offset of the sensor are random, and phases, spin and drag are. With
 --drive all steps are run with an unknown connection, and each machine is driven with the folder that was written. With
---other-errors the machines have errors of other kinds, among them harmonics of the angle sensor.
+--other-errors the machines have errors of other kinds, among them harmonics of the angle sensor. With --nameplate
+unknown_48V the machines are small ones, of the kinds that SMALL names.
 """
 
 import sys
@@ -23,7 +24,10 @@ from fluxtrue_tools.sim import motor as motors
 from fluxtrue_tools.sim.build import ROOT
 
 KINDS = ("hsm1", "saturated", "pmasynrm", "linear", "leaf")
-FOLDER = ROOT / "tests" / "motors" / "unknown"
+SMALL = ("hub", "anaheim", "ebike")  # surface magnets for 48 V: psi_f of 4.0, 0.7 and 2.8 times L i_max
+MOTORS = ROOT / "tests" / "motors"
+FOLDER, SMALL_FOLDER = MOTORS / "unknown", MOTORS / "unknown_48V"
+NAMEPLATES = {FOLDER.name: KINDS, SMALL_FOLDER.name: SMALL}
 FIRST_SEED = 100
 MAP = ("map rms, % of psi_max", "R, %", "R beyond the sensors' gains, %", "gain balance, %",
        "largest current, % of i_max", "movement, deg")  # fmt: skip
@@ -31,9 +35,10 @@ TURNING = ("wrong connections", "offset, deg", "psi_f, %", "inertia, %", "drag, 
            "harmonics of the angle sensor, deg")  # fmt: skip
 
 
-def draw(machines: int) -> list[tuple[str, int]]:
-    """Name and seed of so many hidden machines, of all kinds in turn."""
-    return [(KINDS[k % len(KINDS)], FIRST_SEED + k) for k in range(machines)]
+def draw(machines: int, nameplate: str = FOLDER.name) -> list[tuple[str, int]]:
+    """Name and seed of so many hidden machines, of all kinds of a nameplate in turn."""
+    kinds = NAMEPLATES[nameplate]
+    return [(kinds[k % len(kinds)], FIRST_SEED + k) for k in range(machines)]
 
 
 def _one(name: str, seed: int, folder: Path) -> tuple[float, ...] | None:
@@ -78,35 +83,38 @@ def _turning(name: str, seed: int, folder: Path, other_errors: bool) -> tuple[fl
 
 @click.command()
 @click.option("--machines", type=click.IntRange(min=1), default=40, show_default=True)
+@click.option("--nameplate", type=click.Choice(list(NAMEPLATES)), default=FOLDER.name, show_default=True)
 @click.option("--turning", is_flag=True, help="The steps that turn the shaft, with an unknown connection.")
 @click.option("--drive", is_flag=True, help="All steps; then the folder is built and driven.")
 @click.option("--other-errors", is_flag=True, help="With --turning or --drive: also errors of other kinds.")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="With --drive: folder of the results.")
 @click.option("--fresh", is_flag=True, help="With --drive: throw away the results that are there.")
-def main(machines: int, turning: bool, drive: bool, other_errors: bool, out: Path | None, fresh: bool) -> None:
+def main(machines: int, nameplate: str, turning: bool, drive: bool, other_errors: bool, out: Path | None,
+         fresh: bool) -> None:  # fmt: skip
     """Score hidden machines one after the other."""
     if (turning and drive) or (not drive and (out is not None or fresh)) or (other_errors and not (turning or drive)):
         raise click.UsageError("--out and --fresh belong to --drive, which --turning excludes; --other-errors belongs "
                                "to either")  # fmt: skip
-    drawn = draw(machines)
+    drawn, folder = draw(machines, nameplate), MOTORS / nameplate
     if drive:
-        sys.exit(0 if _driven(drawn, other_errors, out, fresh) else 1)
-    _scored(drawn, turning, other_errors)
+        sys.exit(0 if _driven(folder, drawn, other_errors, out, fresh) else 1)
+    _scored(folder, drawn, turning, other_errors)
 
 
-def _driven(drawn: list[tuple[str, int]], other_errors: bool, out: Path | None, fresh: bool) -> bool:
+def _driven(folder: Path, drawn: list[tuple[str, int]], other_errors: bool, out: Path | None, fresh: bool) -> bool:
     """Whether every bound is met."""
-    job = proof.Job(FOLDER, other_errors)
-    place = out or ROOT / "build" / "commission" / ("other-errors" if other_errors else "driven")
+    job = proof.Job(folder, other_errors)
+    results = ("other-errors" if other_errors else "driven") + ("" if folder == FOLDER else f"-{folder.name}")
+    place = out or ROOT / "build" / "commission" / results
     table = proof.campaign(job, drawn, place, fresh, click.echo)
     text, met = proof.report(job, table, place)
     click.echo(text, nl=False)
     return met
 
 
-def _scored(drawn: list[tuple[str, int]], turning: bool, other_errors: bool) -> None:
+def _scored(folder: Path, drawn: list[tuple[str, int]], turning: bool, other_errors: bool) -> None:
     machines = len(drawn)
-    results = [_turning(name, seed, FOLDER, other_errors) if turning else _one(name, seed, FOLDER)
+    results = [_turning(name, seed, folder, other_errors) if turning else _one(name, seed, folder)
                for name, seed in drawn]  # fmt: skip
     done = np.array([result for result in results if result is not None])
     click.echo(f"{len(done)} of {machines} machines; {machines - len(done)} refused")

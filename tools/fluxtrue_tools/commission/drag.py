@@ -21,6 +21,7 @@ COAST_S, COASTS = 0.25, 16  # the run-down ends at COAST_END of its speed
 COAST_END = 0.4
 SLOWEST = 0.1  # of the largest speed of the run: below it the drag is not evaluated
 LEAST_SHARE = 0.2  # of the largest current of the run
+BENDS = (-8.0, 1.0)  # of psi_f, what a current of i_max along q would add to psi_d: small ones bend it by more
 D = TypeVar("D", bound=Capture)
 STEADY_SHARE = 0.05  # change of a current within a window in which it counts as steady
 
@@ -53,7 +54,8 @@ class _Run:
     is_steady: Array  # the current of a window did not change
     times: Array  # of the middles
     rows: Array
-    middles: Array
+    starts: Array
+    size: int
 
 
 def _run(rows: Array, period_s: float, pole_pairs: int, periods: int) -> _Run:
@@ -68,7 +70,7 @@ def _run(rows: Array, period_s: float, pole_pairs: int, periods: int) -> _Run:
     speed, current, flux, change = np.array(taken).T
     middles = starts + 1 + size // 2
     steady = change.real < STEADY_SHARE * np.abs(current)
-    return _Run(speed.real, current, flux, steady, periods * period_s * middles, rows, middles)
+    return _Run(speed.real, current, flux, steady, periods * period_s * middles, rows, starts, size)
 
 
 @dataclass(frozen=True)
@@ -86,8 +88,12 @@ class Flux:
         return 1.5 * pole_pairs * (psi_d * i.imag - self.l_q_H * i.imag * i.real)
 
 
-def flux_under_current(runs: list[_Run], psi_f_Vs: float) -> Flux:
-    """(CM-20): a part that is neither proportional to the speed nor independent of it is no flux."""
+def flux_under_current(runs: list[_Run], psi_f_Vs: float, i_max_A: float) -> Flux:
+    """(CM-20): a part that is neither proportional to the speed nor independent of it is no flux.
+
+    A light rotor is accelerated by so little current that the errors of the voltages are larger than the flux linkage
+    of saturation: this one has a bound.
+    """
     speed, i, psi, steady = (np.concatenate([getattr(run, name) for run in runs])
                              for name in ("speed", "i", "psi", "is_steady"))  # fmt: skip
     used = steady & (np.abs(i.imag) > LEAST_SHARE * np.abs(i.imag).max()) & (speed > SLOWEST * speed.max())
@@ -95,7 +101,8 @@ def flux_under_current(runs: list[_Run], psi_f_Vs: float) -> Flux:
     along = np.column_stack((d * w, q**2 * w, q, np.sign(q)))
     l_d, bend, *_ = _solve(along, (psi[used].real - psi_f_Vs) * w)
     l_q, *_ = _solve(np.column_stack((q * w, d, np.ones(len(w)))), psi[used].imag * w)
-    return Flux(psi_f_Vs, l_d, bend, l_q)
+    least, most = (share * psi_f_Vs / i_max_A**2 for share in BENDS)
+    return Flux(psi_f_Vs, l_d, min(max(bend, least), most), l_q)
 
 
 def _solve(matrix: Array, values: Array) -> list[float]:
@@ -104,22 +111,42 @@ def _solve(matrix: Array, values: Array) -> list[float]:
     return [float(each) for each in x / scale]
 
 
+def _impulse(run: _Run, torque: Array, spacing_s: float) -> Array:
+    """The impulse of the torque until each window, averaged as the fit of a window averages the speed: the slope of its
+    angles is their change from sample to sample, weighted by a parabola."""
+    until = spacing_s * (np.cumsum(torque) - 0.5 * torque)
+    between = 0.5 * (until[1:] + until[:-1])
+    n = np.arange(1, run.size)
+    weights = n * (run.size - n)
+    return np.array([np.average(between[start + 1 : start + run.size], weights=weights) for start in run.starts])
+
+
 def _changes(run: _Run, torque: Array, spacing_s: float, slowest: float) -> tuple[Array, Array]:
     """From middle to middle: impulse of the torque, time, angle, integral of the squared speed; the change of speed."""
-    impulse = np.concatenate(([0.0], np.cumsum(spacing_s * torque)))[run.middles]
+    impulse = _impulse(run, torque, spacing_s)
     time, w = np.diff(run.times), run.speed
     angle, square = 0.5 * time * (w[1:] + w[:-1]), time * (w[1:] ** 2 + w[1:] * w[:-1] + w[:-1] ** 2) / 3.0
     used = np.minimum(w[1:], w[:-1]) > slowest
     return np.column_stack((np.diff(impulse), -time, -angle, -square))[used], np.diff(w)[used]
 
 
-def evaluate(parts: list[Array], period_s: float, pole_pairs: int, psi_f_Vs: float, periods: int = 1) -> Drag:
+def _without_offset(rows: Array, offset_A: complex) -> Array:
+    """The currents of the machine: while it coasts the drive holds what the sensors show at zero."""
+    turned = offset_A * np.exp(-1j * rows[:, 4])
+    return np.column_stack((rows[:, 0] - turned.real, rows[:, 1] - turned.imag, rows[:, 2:]))
+
+
+def evaluate(parts: list[Array], period_s: float, known: Nameplate, periods: int = 1) -> Drag:
     """(CM-21), (CM-22) over all windows. What is noisy is the change of the speed, by errors of the angle sensor: it
-    is the side that least squares take the noise on. As a factor of J it would make J smaller the noisier it is."""
-    spacing_s = periods * period_s
-    runs = [_run(rows, period_s, pole_pairs, periods) for rows in parts if len(rows) > 2 * WINDOW_S / spacing_s]
+    is the side that least squares take the noise on. As a factor of J it would make J smaller the noisier it is.
+
+    known   with pole pairs, magnet and offsets as they have been measured
+    """
+    spacing_s, pole_pairs = periods * period_s, known.pole_pairs
+    runs = [_run(_without_offset(rows, known.offset_A), period_s, pole_pairs, periods) for rows in parts
+            if len(rows) > 2 * WINDOW_S / spacing_s]  # fmt: skip
     top = max(float(run.speed.max()) for run in runs)
-    flux = flux_under_current(runs, psi_f_Vs)
+    flux = flux_under_current(runs, known.psi_f_Vs, known.i_max_A)
     changes = [_changes(run, flux.torque_Nm(run.rows[:, 0] + 1j * run.rows[:, 1], pole_pairs), spacing_s, SLOWEST * top)
                for run in runs]  # fmt: skip
     matrix, change = np.vstack([part for part, _ in changes]), np.concatenate([part for _, part in changes])
@@ -169,7 +196,7 @@ def measure(drive: D, known: Nameplate, spun: Spun,
         parts, periods = run(drive, known, wanted)
     finally:
         turning.release(drive)
-    found = evaluate(parts, drive.period_s, spun.connection.pole_pairs, spun.psi_f_Vs, periods)
+    found = evaluate(parts, drive.period_s, known, periods)
     if not found.inertia_kgm2 > 0.0:
         raise FluxtrueError(f"commission: {NAME}: an inertia of {found.inertia_kgm2:.3g} kg m^2: the shaft is driven "
                             "from outside")  # fmt: skip

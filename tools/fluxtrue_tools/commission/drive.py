@@ -38,6 +38,7 @@ class Capture(Protocol):
     switched_off: tuple[str, ...]  # those of them that would act by the guesses of the nameplate
     passed: Callable[[float], None]  # called with the seconds for which the drive has run
     slower: float  # how many times longer it runs than software in the loop
+    is_light: bool  # pulses were refused because the rotor moved: small currents move it
 
     @property
     def period_s(self) -> float:
@@ -80,6 +81,7 @@ class SoftwareInTheLoop:
         self._loop = loop
         self.period_s = loop.period_s
         self.passed: Callable[[float], None] = nothing
+        self.is_light = False
 
     @staticmethod
     def _allowed(name: str) -> str:

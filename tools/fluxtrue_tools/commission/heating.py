@@ -14,7 +14,7 @@ import click
 import numpy as np
 
 from fluxtrue_tools.commission import hidden
-from fluxtrue_tools.commission.campaign import FOLDER, KINDS, draw
+from fluxtrue_tools.commission.campaign import FOLDER, KINDS, MOTORS, NAMEPLATES, draw
 from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.drive import Capture, SoftwareInTheLoop
 from fluxtrue_tools.commission.nameplate import Nameplate
@@ -64,12 +64,14 @@ def measure(name: str, seed: int, motor: Motor, known: Nameplate) -> dict[str, t
 
 @click.command()
 @click.option("--machines", type=click.IntRange(min=1), default=len(KINDS), show_default=True)
-def main(machines: int) -> None:
+@click.option("--nameplate", type=click.Choice(list(NAMEPLATES)), default=FOLDER.name, show_default=True)
+def main(machines: int, nameplate: str) -> None:
     """Time and heating of hidden machines, and the worst of each step."""
-    motor = motors.load(str(FOLDER))
-    known = nameplate_of(FOLDER, motor)
+    folder = MOTORS / nameplate
+    motor = motors.load(str(folder))
+    known = nameplate_of(folder, motor)
     found = []
-    for name, seed in draw(machines):
+    for name, seed in draw(machines, nameplate):
         found.append(measure(name, seed, motor, known))
         click.echo(f"{name:10} {seed}  " + "  ".join(f"{step} {s:.1f} s {share:.2f}"
                                                      for step, (s, share) in found[-1].items()))  # fmt: skip

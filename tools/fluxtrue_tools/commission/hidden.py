@@ -23,6 +23,12 @@ from fluxtrue_tools.sim.library import FluxMap, Loop
 from fluxtrue_tools.sim.motor import Motor
 
 IRON_RPM = 4000.0
+LOW_VOLTAGE_V = 60.0  # below: small machines, whose windings drop more of their voltage, at inverters with MOSFETs
+LOW_R = (0.05, 0.25)  # of the phase voltage at i_max: 0.13 to 0.33 of the five such machines in tests/motors
+LOW_DEAD_TIME = (0.3, 1.3)  # of what the nameplate assumes: 0.3 to 1.3 us at 20 kHz
+LOW_INERTIA = (5e-5, 2e-3)  # kg m^2 for each N·m of the largest torque: from a servo to a hub motor
+LOW_DRAG = (0.01, 0.04)  # of the largest torque, at the largest speed: what the current without a load amounts to
+LOW_IRON_RPM_SHARE = 0.44  # of the largest speed, as IRON_RPM of 9000 rpm
 FOLDERS = (ROOT / "firmware" / "motors", ROOT / "tests" / "motors")
 
 
@@ -106,12 +112,36 @@ def _sensors(rng: np.random.Generator, full_scale_A: float) -> dict[str, float]:
     return errors
 
 
-def _connection(name: str, seed: int) -> dict[str, float]:
-    """Nothing of how sensor and leads are connected is known."""
+def _connection(name: str, seed: int, pole_pairs: int) -> dict[str, float]:
+    """Nothing of how sensor and leads are connected is known. Half to twice the pole pairs of the nameplate, whose
+    largest speed would not be that of a machine with others."""
     rng = np.random.default_rng([seed, sum(name.encode()), 1])
-    return {"pole_pairs": float(rng.integers(2, 9)), "phases_swapped": float(rng.integers(0, 2)),
+    pairs = rng.integers(max(pole_pairs // 2, 1), 2 * pole_pairs + 1)
+    return {"pole_pairs": float(pairs), "phases_swapped": float(rng.integers(0, 2)),
             "angle_reversed": float(rng.integers(0, 2)), "angle_offset_rad": float(rng.uniform(-math.pi, math.pi)),
             "angle_bits": 14.0}  # fmt: skip
+
+
+def _is_low_voltage(motor: Motor) -> bool:
+    return motor.plant["vdc_V"] < LOW_VOLTAGE_V
+
+
+def _torque_Nm(truth: Truth, i_max_A: float) -> float:
+    """Of the magnet with the largest current."""
+    return 1.5 * truth.plant["pole_pairs"] * truth.psi_f_Vs * i_max_A
+
+
+def _low_voltage(name: str, seed: int, truth: Truth, motor: Motor, i_max_A: float) -> dict[str, float]:
+    """What a small machine for a low voltage has in place of a large one's: docs/howto/commission.md.
+
+    Its torque is not that of the nameplate, whose guess of the magnet is that of a machine with much field weakening.
+    """
+    rng = np.random.default_rng([seed, sum(name.encode()), 3])
+    torque_Nm, w_max = _torque_Nm(truth, i_max_A), motor.speed_max_rpm * math.pi / 30.0
+    return {"r_ohm_20": float(rng.uniform(*LOW_R)) * motor.plant["vdc_V"] / math.sqrt(3.0) / i_max_A,
+            "dead_time_s": motor.plant["dead_time_s"] * float(rng.uniform(*LOW_DEAD_TIME)),
+            "inertia_kgm2": torque_Nm * math.exp(float(rng.uniform(*np.log(LOW_INERTIA)))),
+            "viscous_Nms": torque_Nm / w_max * float(rng.uniform(*LOW_DRAG))}  # fmt: skip
 
 
 def _other_errors(name: str, seed: int, truth: Truth, motor: Motor, i_max_A: float) -> dict[str, float]:
@@ -122,10 +152,13 @@ def _other_errors(name: str, seed: int, truth: Truth, motor: Motor, i_max_A: flo
     along q, and all of it is excess loss.
     """
     rng = np.random.default_rng([seed, sum(name.encode()), 2])
-    i_A, w = math.sqrt(0.5) * i_max_A, IRON_RPM * math.pi / 30.0
+    is_low = _is_low_voltage(motor)
+    rpm = LOW_IRON_RPM_SHARE * motor.speed_max_rpm if is_low else IRON_RPM
+    i_A, w = math.sqrt(0.5) * i_max_A, rpm * math.pi / 30.0
     psi_d, psi_q = (float(psi) for psi in truth.psi(-i_A, i_A))
     lost_W = float(rng.uniform(0.005, 0.015)) * 1.5 * truth.plant["pole_pairs"] * (psi_d + psi_q) * i_A * w
-    coulomb = motor.torque_max_Nm * float(rng.uniform(0.001, 0.004))
+    torque_Nm = _torque_Nm(truth, i_max_A) if is_low else motor.torque_max_Nm
+    coulomb = torque_Nm * float(rng.uniform(0.001, 0.004))
     errors = {
         "iron_k_excess": lost_W / ((truth.plant["pole_pairs"] * w) ** 1.5 * (psi_d**2 + psi_q**2)),
         "leg_knee_A": i_max_A * float(rng.uniform(0.001, 0.004)),
@@ -161,13 +194,15 @@ def draw(
         "seed": float(rng.integers(1, 1 << 40)),
     }  # fmt: skip
     if not connected:
-        plant |= _connection(name, seed)
+        plant |= _connection(name, seed, round(base["pole_pairs"]))
     if flux_map is None:
         linear = model.psi_d(0.0, 0.0, nd=1), model.psi_q(0.0, 0.0, nq=1), model.psi_d(0.0, 0.0)
         plant |= {"ld_H": float(linear[0]) / current, "lq_H": float(linear[1]) / current, "psi_f_Vs": float(linear[2])}
     else:
         flux_map = FluxMap(current * flux_map.id_A, current * flux_map.iq_A, flux_map.psi_d_Vs, flux_map.psi_q_Vs)
     truth = Truth(model, source_i_max, flux_scale, current, magnet, plant)
+    if _is_low_voltage(motor):
+        plant |= _low_voltage(name, seed, truth, motor, i_max_A)
     if other_errors:
         plant |= _other_errors(name, seed, truth, motor, i_max_A)
     return truth, flux_map, plant

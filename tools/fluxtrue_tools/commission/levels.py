@@ -7,7 +7,7 @@ currents between two bounds instead, for a time that is too short for the rotor 
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -33,6 +33,7 @@ EXPLAINS = 0.01  # of the residuals' sum of squares: twice what a knee removes b
 NEAR = 1.05  # for the slope over the knee
 COMMON = 3  # unknowns of all levels
 LEAST_PERIODS = 100  # at a level
+STRONGER, LEAST_TIME = 1.5, 0.5  # of the voltage, after a level that was held for less of its time
 UNLIMITED = 1000  # reversals: the time ends a level
 TIME = FAILURES[4]
 REPEATS = 2
@@ -192,6 +193,23 @@ def _record(drive: Capture, burst: Burst, known: Nameplate) -> Raw | None:
     return max((raw for raw in raws if raw.is_valid), key=lambda raw: len(raw.i), default=None)
 
 
+def _held(drive: Capture, burst: Burst, known: Nameplate) -> tuple[Raw, float]:
+    """One level, and the voltage that held it. The resistance is only guessed: where the winding and the legs drop more
+    than the voltage, the current does not reach its level, and a higher voltage follows."""
+    level = 0.5 * sum(burst.d)
+    while True:
+        raw = _record(drive, burst, known)
+        if raw is None:
+            raise FluxtrueError(f"commission: resistance: at {level:.3g} A: the current was too large")
+        held = raw.within(*burst.d)
+        if raw.failure != TIME or len(held.i) >= LEAST_TIME * burst.periods or burst.v_d >= MOST:
+            break
+        burst = replace(burst, v_d=min(STRONGER * burst.v_d, MOST))
+    if len(held.i) < LEAST_PERIODS:
+        raise FluxtrueError(f"commission: resistance: {level:.3g} A was not reached in time")
+    return held, burst.v_d
+
+
 def measure(drive: Capture, known: Nameplate, first: First) -> list[Raw]:
     """Both polarities of each level; the voltages contain the drive's compensation."""
     i_max_A = known.i_max_A
@@ -203,11 +221,6 @@ def measure(drive: Capture, known: Nameplate, first: First) -> list[Raw]:
     for level in (sign * level * i_max_A for _ in range(REPEATS) for level in LEVELS for sign in (1.0, -1.0)):
         burst = Burst(v_d, v_q, (level - band, level + band), (-band, band), UNLIMITED,
                       periods=round(SECONDS / drive.period_s))  # fmt: skip
-        raw = _record(drive, burst, known)
-        if raw is None:
-            raise FluxtrueError(f"commission: resistance: at {level:.3g} A: the current was too large")
-        raws.append(raw.within(level - band, level + band))
-        if len(raws[-1].i) < LEAST_PERIODS:
-            raise FluxtrueError(f"commission: resistance: {level:.3g} A was not reached in time")
-        raws[-1] = raws[-1].compensated(*compensation)
+        held, v_d = _held(drive, burst, known)
+        raws.append(held.compensated(*compensation))
     return raws

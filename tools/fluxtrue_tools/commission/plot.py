@@ -60,13 +60,13 @@ def _curves(axes: Axes, found: Found, known: Nameplate, of_d: bool) -> None:
     magnet = float(found.surface.model.psi_d(0.0, 0.0))
     values = psi.real - magnet if of_d else psi.imag * np.sign(i.imag)
     for k, share in enumerate(np.linspace(0.0, 0.8, LINES)):
-        level = share * known.i_max_A * (1.0 if of_d else -1.0)
+        level = share * known.i_max_A * (1.0 if of_d else -1.0) + 0.0  # no minus zero
         reach = np.sqrt(1.0 - share**2) * known.i_max_A
         line = np.linspace(-reach if of_d else 0.0, 0.0 if of_d else reach, 80)
         there = np.full(len(line), level)
         model = found.surface.model
         drawn = model.psi_d(line, there) - magnet if of_d else model.psi_q(there, line)
-        axes.plot(line, 1e3 * drawn, color=f"C{k}", lw=1.2, label=f"{'|i_q|' if of_d else 'i_d'} = {level:.0f} A")
+        axes.plot(line, 1e3 * drawn, color=f"C{k}", lw=1.2, label=f"{'|i_q|' if of_d else 'i_d'} = {level:.3g} A")
         near = (np.abs(other - level) < NEAR * known.i_max_A) & (own >= line[0]) & (own <= line[-1])
         axes.plot(own[near], 1e3 * values[near], ".", color=f"C{k}", ms=2)
     name, along = ("psi_d", "i_d") if of_d else ("psi_q", "|i_q|")
@@ -92,19 +92,23 @@ def _left(axes: Axes, found: Found) -> None:
     axes.legend(fontsize=8)
 
 
-def _mtpa(axes: Axes, grid: Grid, known: Nameplate) -> None:
+def magnet_of(found: Found, known: Nameplate) -> str:
+    """Where the magnet's flux linkage comes from."""
+    return "the measured" if found.spun is not None else "a given" if known.psi_f_source else "the nameplate's"
+
+
+def _mtpa(axes: Axes, found: Found, grid: Grid, known: Nameplate) -> None:
     d, q = np.meshgrid(grid.id_A, grid.iq_A, indexing="ij")
     torque = 1.5 * known.pole_pairs * (grid.psi_d_Vs * q - grid.psi_q_Vs * d)
     torque = np.where(np.hypot(d, q) <= 1.02 * known.i_max_A, torque, np.nan)
     shown = axes.contour(d, q, torque, levels=10, linewidths=0.8)
-    axes.clabel(shown, fontsize=7, fmt="%.0f N·m")
+    axes.clabel(shown, fontsize=7, fmt="%.3g N·m")
     at = RectBivariateSpline(grid.id_A, grid.iq_A, 1.5 * known.pole_pairs * (grid.psi_d_Vs * q - grid.psi_q_Vs * d))
     angles = np.linspace(0.5 * np.pi, np.pi, 181)
     amplitudes = np.linspace(0.02, 1.0, 40) * known.i_max_A
     best = [angles[int(np.argmax(at.ev(a * np.cos(angles), a * np.sin(angles))))] for a in amplitudes]
     axes.plot(amplitudes * np.cos(best), amplitudes * np.sin(best), "r", lw=1.5, label="MTPA")
-    magnet = "a given" if known.psi_f_source else "the nameplate's"
-    axes.set(title=f"Torque of this map, with {magnet} psi_f", xlabel="i_d, A", ylabel="i_q, A")
+    axes.set(title=f"Torque of this map, with {magnet_of(found, known)} psi_f", xlabel="i_d, A", ylabel="i_q, A")
     axes.legend(fontsize=8)
 
 
@@ -175,9 +179,9 @@ def of_step(step: str, number: int, found: Found, known: Nameplate, theme: str) 
     return _png(lambda axes: draw(axes, found, known), theme)
 
 
-def of_torque(grid: Grid, known: Nameplate, theme: str) -> bytes:
+def of_torque(found: Found, grid: Grid, known: Nameplate, theme: str) -> bytes:
     """Torque and MTPA line of the finished map as PNG."""
-    return _png(lambda axes: _mtpa(axes, grid, known), theme)
+    return _png(lambda axes: _mtpa(axes, found, grid, known), theme)
 
 
 def write(found: Found, known: Nameplate, grid: Grid | None, path: Path) -> None:
@@ -195,6 +199,6 @@ def write(found: Found, known: Nameplate, grid: Grid | None, path: Path) -> None
         _curves(axes[0, 2], found, known, of_d=False)
         _in_time(axes[1, 0], found)
         _left(axes[1, 1], found)
-        _mtpa(axes[1, 2], grid, known)
+        _mtpa(axes[1, 2], found, grid, known)
     figure.savefig(path, dpi=90, metadata={"Software": None})
     plt.close(figure)

@@ -28,12 +28,16 @@ LEVELS = (1.0, -1.0, 0.5, -0.5, -0.5, 0.5, -1.0, 1.0)  # of it: what drifts even
 LEVEL_S, WINDOW_S = 0.2, 0.05
 SETTLED_SHARE = 1e-3  # of i_max: the mean current of a window is the wanted one
 WINDOWS = 20  # to settle a level
+TURNS = 1.2  # electrical, in a window: over whole turns the errors of sensors and inverter have no mean
+SLOW_HZ, SLOW_SHARE = 20.0, 0.22  # electrical, and of the reached speed: below, the shaft is accelerated again
+NEAR_SHARE = 0.9  # of the reached speed: more than this is no slow shaft
 LARGE = 0.75  # between the magnitudes of both levels
 COMPENSATION = "dead_time_compensation"
 Q_SHARES = (0.02, 0.04, 0.08, 0.16, 0.25, 0.4)  # of i_max: more while the machine does not accelerate
 ALONG_Q = tuple(1j * share for share in Q_SHARES)
 TURNED = (*ALONG_Q, Q_SHARES[-1] * cmath.exp(1j * math.atan2(1.0, -0.5)))  # with reluctance for a weak magnet
 TRY_S, REACH_S, LONGEST_S = 0.05, 0.8, 10.0
+PARTS, OVER = 20, 1.1  # of a try, and of the wanted speed: a light rotor gains more than it may in one try
 ENOUGH_SHARE = 0.5  # of the wanted speed: a machine whose drag takes all of its torque before is measured there
 BRAKE_STEPS = 15  # with each of the currents
 ROUGH_RAD = math.radians(4.0)  # beyond, the currents along d make torque
@@ -96,18 +100,28 @@ def reach(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str, curr
         level = min(level + 1, len(currents) - 1) if late and tries % 2 == 0 else level
 
 
-def accelerate(
-    drive: Capture, known: Nameplate, wanted_rad_s: float, step: str, currents: Sequence[complex] = ALONG_Q
-) -> Array:
-    """From a standstill; all rows are kept."""
+def accelerate(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str,
+               currents: Sequence[complex] = ALONG_Q, speed: float = 0.0) -> Array:  # fmt: skip
+    """From a standstill, or the given speed; all rows are kept."""
     rows: list[Array] = []
 
     def advance() -> float:
-        rows.append(turning.advance(drive, TRY_S, step))
-        return turning.speed_rad_s(rows[-1][len(rows[-1]) // 2 :], drive.period_s) * _electrical_sign(drive)
+        begun = len(rows)
+        for _ in range(PARTS):
+            rows.append(turning.advance(drive, TRY_S / PARTS, step))
+            if abs(turning.speed_rad_s(rows[-1], drive.period_s)) > OVER * abs(wanted_rad_s):
+                break
+        taken = np.vstack(rows[begun:])
+        return turning.speed_rad_s(taken[len(taken) // 2 :], drive.period_s) * _electrical_sign(drive)
 
-    reach(drive, known, wanted_rad_s, step, currents, 0.0, advance)
+    reach(drive, known, wanted_rad_s, step, currents, speed, advance)
     return np.vstack(rows)
+
+
+def _last_speed(drive: Capture, rows: Array) -> float:
+    """At the end of the rows, mechanical, positive in the electrical direction."""
+    last = rows[-round(0.5 * WINDOW_S / drive.period_s) :]
+    return turning.speed_rad_s(last, drive.period_s) * _electrical_sign(drive)
 
 
 def _electrical_sign(drive: Capture) -> float:
@@ -142,35 +156,47 @@ def brake(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str) -> A
     return np.vstack(rows)
 
 
-def _coast(drive: Capture, known: Nameplate) -> list[Array]:
+def _is_slow(speed_rad_s: float, top_rad_s: float, known: Nameplate) -> bool:
+    """A small rotor loses its speed before all levels have been measured."""
+    hz, share = known.pole_pairs * abs(speed_rad_s) / turning.TURN, speed_rad_s / top_rad_s
+    return share < SLOW_SHARE or (hz < SLOW_HZ and share < NEAR_SHARE)
+
+
+def _coast(drive: Capture, known: Nameplate, top_rad_s: float) -> list[Array]:
     """The levels of the current along d, each when it has settled.
 
     Without the drive's own compensation of the dead time: it acts by the sign of a measured current, turned with the
     rotor by a period and a half, so that what it leaves is not along the current.
+
+    top_rad_s   the speed that the shaft has reached, mechanical, positive in the electrical direction
     """
-    taken, q_A = [], 0.0
+    taken, q_A, speed = [], 0.0, top_rad_s
     compensation = drive.get(COMPENSATION)
     drive.set(COMPENSATION, 0.0)
     try:
         for level in LEVELS:
-            _settle_current(drive, known, level * D_SHARE * known.i_max_A, q_A)
+            if _is_slow(speed, top_rad_s, known):
+                speed = _last_speed(drive, accelerate(drive, known, top_rad_s, NAME, TURNED, speed))
+            _settle_current(drive, known, level * D_SHARE * known.i_max_A, q_A, speed)
             taken.append(turning.advance(drive, LEVEL_S, NAME))
             q_A -= mean_current(taken[-1], known.offset_A).imag
+            speed = _last_speed(drive, taken[-1])
     finally:
         drive.set(COMPENSATION, compensation)
     turning.currents(drive, 0.0, 0.0)
     return taken
 
 
-def _settle_current(drive: Capture, known: Nameplate, i_d_A: float, q_A: float) -> None:
-    """Until the mean current is the wanted one, along d.
+def _settle_current(drive: Capture, known: Nameplate, i_d_A: float, q_A: float, speed_rad_s: float) -> None:
+    """Until the mean current is the wanted one, along d, in windows that have whole electrical turns.
 
     While the machine becomes slower, its voltage falls, and current control follows it by a constant current along q,
     for which the reference makes up with q_A.
     """
     turning.currents(drive, i_d_A, q_A)
+    window_s = max(WINDOW_S, TURNS * turning.TURN / (known.pole_pairs * abs(speed_rad_s)))
     for _ in range(WINDOWS):
-        left_A = i_d_A - mean_current(turning.advance(drive, WINDOW_S, NAME), known.offset_A)
+        left_A = i_d_A - mean_current(turning.advance(drive, window_s, NAME), known.offset_A)
         if abs(left_A) < SETTLED_SHARE * known.i_max_A:
             return
     raise FluxtrueError(f"commission: {NAME}: {i_d_A:.3g} A along d did not settle: {abs(left_A):.2g} A are left")
@@ -232,8 +258,8 @@ def magnet(taken: list[Array], period_s: float, offset_A: complex) -> Magnet:
 
 def direction(drive: Capture, known: Nameplate, wanted_rad_s: float, _: Connection) -> Magnet:
     """One direction: accelerated, coasting with all levels of the current, and braked."""
-    accelerate(drive, known, wanted_rad_s, NAME, TURNED)
-    taken = _coast(drive, known)
+    top_rad_s = _last_speed(drive, accelerate(drive, known, wanted_rad_s, NAME, TURNED))
+    taken = _coast(drive, known, top_rad_s)
     found = magnet(taken, drive.period_s, known.offset_A)
     brake(drive, known, wanted_rad_s, NAME)
     return replace(found, sensor=fit([Coasting(rows[:, 5], rows[:, 1], drive.period_s) for rows in taken]))

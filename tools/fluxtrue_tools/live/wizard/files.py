@@ -41,7 +41,7 @@ def _drawn(wizard: "Wizard", step: str, panel: int, theme: str) -> bytes:
         folder = wizard.folder
         if folder is None or folder.grid is None:
             raise FluxtrueError("the motor's folder has not been written")
-        return plot.of_torque(folder.grid, folder.known, theme)
+        return plot.of_torque(folder.found, folder.grid, folder.known, theme)
     found, known, _ = wizard.result(step)
     return plot.of_step(step, panel, found, known, theme)
 

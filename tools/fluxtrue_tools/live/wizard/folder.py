@@ -22,6 +22,7 @@ class Folder:
     report: str
     grid: Grid | None
     known: Nameplate
+    found: Found
 
 
 def written(found: Found, known: Nameplate, nameplate: Path, name: str) -> Folder:
@@ -34,4 +35,4 @@ def written(found: Found, known: Nameplate, nameplate: Path, name: str) -> Folde
         with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
             for path in sorted(staging.iterdir()):
                 archive.write(path, f"{name}/{path.name}")
-        return Folder(name, content.getvalue(), report, grid, known)
+        return Folder(name, content.getvalue(), report, grid, known, found)
