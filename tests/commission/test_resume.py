@@ -11,7 +11,7 @@ from fluxtrue_tools.cli import EXIT_INTERRUPTED
 from fluxtrue_tools.cli import run as command
 from fluxtrue_tools.commission import drag, hidden, levels, spin
 from fluxtrue_tools.commission.connection import Followed
-from fluxtrue_tools.commission.harmonics import Harmonics, Wave
+from fluxtrue_tools.commission.harmonics import Harmonics
 from fluxtrue_tools.commission.steps import Found
 from fluxtrue_tools.commission.turning import Connection
 from fluxtrue_tools.commission.work import Work
@@ -93,7 +93,7 @@ def test_resume_wants_the_folder_of_an_earlier_run(
 
 def test_what_is_kept_is_what_was_found(tmp_path: Path) -> None:
     wiring = Connection(3, True, 0.25)
-    uneven = Harmonics(Wave(0.01 - 0.02j, 1e-4), Wave(-0.003j, 2e-4), 5e-4)
+    uneven = Harmonics([0.01 - 0.02j, -0.003j, 0j, 1e-4j], [1e-4] * 4, [1e-5j] * 4, 0.07, True)
     found = Found(1.5 - 0.5j, 2.0, Followed(7.5, -3.01, 0.1, wiring),
                   spin.Spun(wiring, 0.16, 1e-4, 2e-4, 1e-5, 400.0, uneven),
                   drag.Drag(0.06, 1e-4, 0.1, 2e-3, 3e-6, 10.0, 100.0))  # fmt: skip

@@ -40,6 +40,9 @@ from fluxtrue_tools.sim import motor as motors
 
 SEED = 101
 OFFSET_DEG, PSI_F, INERTIA, DRAG = 0.2, 0.005, 0.03, 0.1  # the bounds of tests/commission/test_bus_turning.py
+HARMONICS = ("Harmonic of the angle sensor once per turn, electrical",
+             "Harmonic of the angle sensor twice per turn, electrical",
+             "The larger of three and four times per turn")  # fmt: skip
 SPIN_S = 600.0  # of simulated time, for the longest step
 
 
@@ -161,15 +164,18 @@ def test_angle_offset_and_magnet_are_found(bench: Bench) -> None:
     offset_deg = value(rows["Electrical angle at the sensor's zero"][0])
     assert abs(math.remainder(offset_deg - math.degrees(truth.offset_rad), 360.0)) <= OFFSET_DEG
     assert value(rows["Electrical angle at the sensor's zero"][1]) > 0.0
-    for often in ("once", "twice"):
-        found, sigma, _ = rows[f"Harmonic of the angle sensor {often} per turn, electrical"]
-        assert value(found) <= OFFSET_DEG and 0.0 < value(sigma) <= OFFSET_DEG
+    for name in HARMONICS:
+        found, sigma, _ = rows[name]
+        assert value(found) <= OFFSET_DEG and value(sigma) > 0.0
 
 
 def test_inertia_and_drag_are_found(bench: Bench) -> None:
     truth, rows = bench.truth, measure(bench, "drag")
     inertia, sigma, _ = rows.pop("Inertia")
     assert abs(value(inertia) / truth.plant["inertia_kgm2"] - 1.0) <= INERTIA and value(sigma) > 0.0
+    for name in HARMONICS:
+        found, sigma, _ = rows.pop(name)
+        assert value(found) <= OFFSET_DEG and 0.0 < value(sigma) <= OFFSET_DEG
     assert len(rows) == 2, "the drag at two speeds"
     for name, (torque, *_) in rows.items():
         rpm = float(name.removeprefix("Drag at ").removesuffix(" rpm"))

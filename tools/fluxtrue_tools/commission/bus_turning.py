@@ -100,14 +100,14 @@ def direction(drive: OverTheBus, known: Nameplate, wanted_rad_s: float, rough: C
                 raise FluxtrueError(f"commission: {spin.NAME}: {i_d_A:.3g} A along d did not settle: "
                                     f"{mean_A.real:.3g} A flow")  # fmt: skip
             q_A -= mean_A.imag
-        sensor = _sensor(drive, known, wanted_rad_s)
+        sensor = _sensor(drive, known, wanted_rad_s, rough)
         _brake(drive, known, wanted_rad_s)
     finally:
         drive.set(spin.COMPENSATION, compensation)
     return replace(spin.magnet(taken, drive.period_s, known.offset_A), sensor=sensor)
 
 
-def _sensor(drive: OverTheBus, known: Nameplate, wanted_rad_s: float) -> Direction | None:
+def _sensor(drive: OverTheBus, known: Nameplate, wanted_rad_s: float, wired: Connection) -> Direction | None:
     """A window without current. The scope captures the angle that the firmware has corrected: its correction, which
     it adapts while the shaft turns, is taken away again."""
     if not drive.angle_correction():
@@ -123,7 +123,11 @@ def _sensor(drive: OverTheBus, known: Nameplate, wanted_rad_s: float) -> Directi
         corrections.append(drive.angle_correction())
 
     rows = drive.capture_during(SENSOR, WORDS // len(SENSOR), 1, coast)
-    found = fit([Coasting(rows[:, 0], rows[:, 1], drive.period_s)])
+    theta_e = wired.offset_rad + (-wired.pole_pairs if wired.reversed else wired.pole_pairs) * turning.TURN * rows[:, 0]
+    i_q_A = rows[:, 1] - (known.offset_A * np.exp(-1j * theta_e)).imag
+    found = fit([Coasting(rows[:, 0], i_q_A, drive.period_s)])
+    if found is None:
+        return None
     correction = np.mean(corrections, axis=0)
     return replace(found, waves=found.waves - np.append(correction, np.zeros(len(ORDERS) - len(correction))))
 

@@ -21,7 +21,10 @@ COAST_S, COASTS = 0.25, 16  # the run-down ends at COAST_END of its speed
 COAST_END = 0.4
 SLOWEST = 0.1  # of the largest speed of the run: below it the drag is not evaluated
 LEAST_SHARE = 0.2  # of the largest current of the run
-BENDS = (-8.0, 1.0)  # of psi_f, what a current of i_max along q would add to psi_d: small ones bend it by more
+BENDS = (
+    -8.0,
+    1.0,
+)  # of psi_f: what i_max along q may add to psi_d, by the slope at small currents, which is the steepest
 D = TypeVar("D", bound=Capture)
 STEADY_SHARE = 0.05  # change of a current within a window in which it counts as steady
 
@@ -130,12 +133,6 @@ def _changes(run: _Run, torque: Array, spacing_s: float, slowest: float) -> tupl
     return np.column_stack((np.diff(impulse), -time, -angle, -square))[used], np.diff(w)[used]
 
 
-def _without_offset(rows: Array, offset_A: complex) -> Array:
-    """The currents of the machine: while it coasts the drive holds what the sensors show at zero."""
-    turned = offset_A * np.exp(-1j * rows[:, 4])
-    return np.column_stack((rows[:, 0] - turned.real, rows[:, 1] - turned.imag, rows[:, 2:]))
-
-
 def evaluate(parts: list[Array], period_s: float, known: Nameplate, periods: int = 1) -> Drag:
     """(CM-21), (CM-22) over all windows. What is noisy is the change of the speed, by errors of the angle sensor: it
     is the side that least squares take the noise on. As a factor of J it would make J smaller the noisier it is.
@@ -143,7 +140,7 @@ def evaluate(parts: list[Array], period_s: float, known: Nameplate, periods: int
     known   with pole pairs, magnet and offsets as they have been measured
     """
     spacing_s, pole_pairs = periods * period_s, known.pole_pairs
-    runs = [_run(_without_offset(rows, known.offset_A), period_s, pole_pairs, periods) for rows in parts
+    runs = [_run(spin.machine_currents(rows, known.offset_A), period_s, pole_pairs, periods) for rows in parts
             if len(rows) > 2 * WINDOW_S / spacing_s]  # fmt: skip
     top = max(float(run.speed.max()) for run in runs)
     flux = flux_under_current(runs, known.psi_f_Vs, known.i_max_A)

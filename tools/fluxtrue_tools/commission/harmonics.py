@@ -7,7 +7,7 @@ is an error of the sensor.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -17,12 +17,16 @@ from fluxtrue_tools.motor.flux_model import Array
 ORDERS: Final = (1, 2, 3, 4)  # per turn of the sensor
 DEGREE: Final = 3  # of the smooth movement over the time of a window
 ROUNDS: Final = 3  # the harmonic belongs to the angle of the shaft, which is the shown one without it
-LARGE_RAD: Final = math.radians(2.0)  # the largest coefficient that the firmware corrects
+LARGE_RAD: Final = math.radians(2.0)  # electrical
+SIGMAS: Final = 3.0  # an amplitude that is no error of the measurement
+LEAST_TURNS: Final = 0.7  # of the sensor in a window: in less, the smooth movement resembles the harmonics
+LIGHTER: Final = 15.0  # a rotor may be so many times lighter than the nameplate's guess
+SWING_SHARE: Final = 0.1  # uncertainty of a swing that was computed with a measured inertia
 
 
 @dataclass(frozen=True)
 class Coasting:
-    """One window: in each sample the turns of the sensor, and the current that makes torque."""
+    """One window: in each sample the turns of the sensor, and the machine's current that makes torque."""
 
     turns: Array
     i_q_A: Array
@@ -53,16 +57,44 @@ class Wave:
 
 @dataclass(frozen=True)
 class Harmonics:
-    """Once and twice per turn of the sensor; the larger amplitude of those three and four times per turn."""
+    """Once to four times per turn of the sensor, electrical: what it shows, how far the directions are from their mean,
+    and what is to be added because the machine's own currents make the shaft swing, (CM-39), times the inertia."""
 
-    first: Wave
-    second: Wave
-    further_rad: float
+    shown_rad: Sequence[complex]
+    spread_rad: Sequence[float]
+    swing_rad_kgm2: Sequence[complex]
+    inertia_kgm2: float
+    is_measured: bool  # the inertia; else it is the nameplate's guess, with which nothing can be corrected
+
+    def wave(self, order: int) -> Wave:
+        """(CM-38)."""
+        swing = self.swing_rad_kgm2[order - 1] / self.inertia_kgm2
+        sigma = math.hypot(self.spread_rad[order - 1], (SWING_SHARE if self.is_measured else LIGHTER) * abs(swing))
+        return Wave(self.shown_rad[order - 1] + (swing if self.is_measured else 0.0), sigma)
+
+    @property
+    def first(self) -> Wave:
+        """Once per turn."""
+        return self.wave(1)
+
+    @property
+    def second(self) -> Wave:
+        """Twice per turn."""
+        return self.wave(2)
+
+    @property
+    def further(self) -> Wave:
+        """The larger of those three and four times per turn."""
+        return max((self.wave(3), self.wave(4)), key=lambda wave: abs(wave.value_rad))
 
     @property
     def is_large(self) -> bool:
-        """More than a well-mounted sensor has, and than the firmware corrects."""
-        return max(abs(self.first.value_rad), abs(self.second.value_rad), self.further_rad) > LARGE_RAD
+        """More than a well-mounted sensor has."""
+        return any(abs(wave.value_rad) > max(LARGE_RAD, SIGMAS * wave.sigma_rad) for wave in map(self.wave, ORDERS))
+
+    def with_inertia(self, inertia_kgm2: float) -> "Harmonics":
+        """The same with a measured inertia."""
+        return replace(self, inertia_kgm2=inertia_kgm2, is_measured=True)
 
 
 def _deviation(angle: Array, waves: Array) -> Array:
@@ -84,31 +116,35 @@ def _equations(window: Coasting, waves: Array) -> tuple[Array, Array]:
     return parts[:, : len(columns)], parts[:, len(columns) :]
 
 
-def fit(windows: Sequence[Coasting]) -> Direction:
-    """Windows of one direction, each with a smooth movement of its own, together."""
+def _turns(window: Coasting) -> float:
+    return abs(float(window.turns[-1] - window.turns[0]))
+
+
+def fit(windows: Sequence[Coasting]) -> Direction | None:
+    """Windows of one direction, each with a smooth movement of its own, together; None: no window is long enough."""
+    windows = [window for window in windows if _turns(window) >= LEAST_TURNS]
+    if not windows:
+        return None
     waves = np.zeros(len(ORDERS), complex)
     for _ in range(ROUNDS):
         matrices, values = zip(*(_equations(window, waves) for window in windows), strict=True)
         x, *_ = np.linalg.lstsq(np.vstack(matrices), np.vstack(values), rcond=None)
         waves, currents = (x[0::2] - 1j * x[1::2]).T
-    turns = sum(abs(float(window.turns[-1] - window.turns[0])) for window in windows)
     seconds = sum(window.spacing_s * (len(window.turns) - 1) for window in windows)
-    return Direction(waves, currents, 2.0 * math.pi * turns / seconds)
-
-
-def _swing(found: Direction, torque_Nm_per_A: float, inertia_kgm2: float) -> Array:
-    """(CM-39): by which these currents make the shaft itself swing."""
-    speed = np.array(ORDERS) * found.speed_rad_s
-    return np.asarray(torque_Nm_per_A * np.abs(found.currents_A) / (inertia_kgm2 * speed**2))
+    return Direction(waves, currents, 2.0 * math.pi * sum(map(_turns, windows)) / seconds)
 
 
 def together(found: Sequence[Direction], pole_pairs: int, torque_Nm_per_A: float, inertia_kgm2: float) -> Harmonics:
-    """(CM-38): the mean of all directions. The uncertainty has two parts: how far they are from each other, and how
-    far the shaft may swing, with the nameplate's inertia."""
+    """(CM-38): the mean of all directions.
+
+    torque_Nm_per_A   in the direction in which the sensor counts
+    inertia_kgm2      the nameplate's
+    """
+    orders = np.array(ORDERS)
     waves = pole_pairs * np.array([each.waves for each in found])
-    swing = pole_pairs * np.mean([_swing(each, torque_Nm_per_A, inertia_kgm2) for each in found], axis=0)
+    swing = np.mean([each.currents_A / (orders * each.speed_rad_s) ** 2 for each in found], axis=0)
     mean = waves.mean(axis=0)
     spread = np.sqrt((np.abs(waves - mean) ** 2).sum(axis=0) / max(len(found) - 1, 1) / len(found))
-    sigma = np.hypot(spread, swing)
-    first, second = (Wave(complex(mean[k]), float(sigma[k])) for k in range(2))
-    return Harmonics(first, second, float(np.abs(mean[2:]).max()))
+    return Harmonics([complex(value) for value in mean], [float(value) for value in spread],
+                     [complex(value) for value in pole_pairs * torque_Nm_per_A * swing], inertia_kgm2,
+                     is_measured=False)  # fmt: skip

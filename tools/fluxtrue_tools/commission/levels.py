@@ -218,9 +218,11 @@ def measure(drive: Capture, known: Nameplate, first: First) -> list[Raw]:
     v_q = min(max(per_period * first.l_q_H, LEAST_Q), MOST)
     compensation = known.offset_A, drive.get("compensation_V"), drive.get("compensation_knee_A")
     band, raws = BAND * i_max_A, []
+    enough: dict[float, float] = {}  # by level: at a smaller one, the voltage of a larger one makes too much ripple
     for level in (sign * level * i_max_A for _ in range(REPEATS) for level in LEVELS for sign in (1.0, -1.0)):
-        burst = Burst(v_d, v_q, (level - band, level + band), (-band, band), UNLIMITED,
+        volts = max([v_d, *(needed for other, needed in enough.items() if other <= abs(level))])
+        burst = Burst(volts, v_q, (level - band, level + band), (-band, band), UNLIMITED,
                       periods=round(SECONDS / drive.period_s))  # fmt: skip
-        held, v_d = _held(drive, burst, known)
+        held, enough[abs(level)] = _held(drive, burst, known)
         raws.append(held.compensated(*compensation))
     return raws

@@ -7,13 +7,12 @@ from typing import Final
 import numpy as np
 
 from fluxtrue_tools.commission import iron
-from fluxtrue_tools.commission.harmonics import LARGE_RAD, Harmonics, Wave
+from fluxtrue_tools.commission.harmonics import LARGE_RAD, SIGMAS, Harmonics, Wave
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.steps import Found
 from fluxtrue_tools.motor.map_import.grid import Grid
 
 OFTEN: Final = {1: "once", 2: "twice"}
-SIGMAS: Final = 3.0  # an amplitude with a place
 
 
 def _wave(wave: Wave, order: int) -> str:
@@ -27,8 +26,11 @@ def _harmonics(found: Harmonics | None) -> list[str]:
     if found is None:
         return ["  harmonics of the angle sensor: not measured"]
     waves = "; ".join(_wave(wave, order) for order, wave in ((1, found.first), (2, found.second)))
+    further, sigma = (math.degrees(abs(rad)) for rad in (found.further.value_rad, found.further.sigma_rad))
     lines = [f"  harmonics of the angle sensor, electrical amplitudes: {waves}; three and four times per turn at most "
-             f"{math.degrees(found.further_rad):.2f} degrees"]  # fmt: skip
+             f"{further:.2f} ±{sigma:.1g} degrees"]  # fmt: skip
+    if not found.is_measured:
+        lines.append("  their uncertainty is that of the nameplate's inertia; the step drag measures it")
     if found.is_large:
         lines.append(f"  the angle sensor is uneven by more than {math.degrees(LARGE_RAD):.0f} electrical degrees: "
                      "check how it is mounted (centred, parallel to the shaft, at the right distance, away from "

@@ -84,7 +84,7 @@ def harmonics_deg(found: Spun, truth: Truth) -> float:
         return math.nan
     waves = (found.harmonics.first.value_rad, found.harmonics.second.value_rad)
     errors = [abs(wave - true) for wave, true in zip(waves, waves_rad(truth), strict=True)]
-    return math.degrees(max(*errors, found.harmonics.further_rad))
+    return math.degrees(max(*errors, abs(found.harmonics.further.value_rad)))
 
 
 DRAG_FROM = 0.3  # of the largest speed of the run

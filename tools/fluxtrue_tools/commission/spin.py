@@ -28,7 +28,7 @@ LEVELS = (1.0, -1.0, 0.5, -0.5, -0.5, 0.5, -1.0, 1.0)  # of it: what drifts even
 LEVEL_S, WINDOW_S = 0.2, 0.05
 SETTLED_SHARE = 1e-3  # of i_max: the mean current of a window is the wanted one
 WINDOWS = 20  # to settle a level
-TURNS = 1.0  # electrical, in a window: over whole turns the errors of sensors and inverter have no mean
+LONGER, LEAST_TURNED = 1.2, 0.2  # electrical turns: of the window after one without a whole turn
 SLOW_HZ, SLOW_SHARE = 20.0, 0.22  # electrical, and of the reached speed: below, the shaft is accelerated again
 NEAR_SHARE = 0.9  # of the reached speed: more than this is no slow shaft
 LARGE = 0.75  # between the magnitudes of both levels
@@ -157,12 +157,12 @@ def brake(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str) -> A
 
 
 def _is_slow(speed_rad_s: float, top_rad_s: float, known: Nameplate) -> bool:
-    """A small rotor loses its speed before all levels have been measured."""
+    """The shaft is to be accelerated again: a small rotor loses its speed before all levels have been measured."""
     hz, share = known.pole_pairs * abs(speed_rad_s) / turning.TURN, speed_rad_s / top_rad_s
     return share < SLOW_SHARE or (hz < SLOW_HZ and share < NEAR_SHARE)
 
 
-def _coast(drive: Capture, known: Nameplate, top_rad_s: float) -> list[Array]:
+def _coast(drive: Capture, known: Nameplate, wanted_rad_s: float, top_rad_s: float) -> list[Array]:
     """The levels of the current along d, each when it has settled.
 
     Without the drive's own compensation of the dead time: it acts by the sign of a measured current, turned with the
@@ -171,12 +171,13 @@ def _coast(drive: Capture, known: Nameplate, top_rad_s: float) -> list[Array]:
     top_rad_s   the speed that the shaft has reached, mechanical, positive in the electrical direction
     """
     taken, q_A, speed = [], 0.0, top_rad_s
+    again_rad_s = math.copysign(min(abs(top_rad_s), abs(wanted_rad_s)), top_rad_s)
     compensation = drive.get(COMPENSATION)
     drive.set(COMPENSATION, 0.0)
     try:
         for level in LEVELS:
             if _is_slow(speed, top_rad_s, known):
-                speed = _last_speed(drive, accelerate(drive, known, top_rad_s, NAME, TURNED, speed))
+                speed = _last_speed(drive, accelerate(drive, known, again_rad_s, NAME, TURNED, speed))
             _settle_current(drive, known, level * D_SHARE * known.i_max_A, q_A, speed)
             taken.append(turning.advance(drive, LEVEL_S, NAME))
             q_A -= mean_current(taken[-1], known.offset_A).imag
@@ -188,17 +189,22 @@ def _coast(drive: Capture, known: Nameplate, top_rad_s: float) -> list[Array]:
 
 
 def _settle_current(drive: Capture, known: Nameplate, i_d_A: float, q_A: float, speed_rad_s: float) -> None:
-    """Until the mean current is the wanted one, along d, in windows that have whole electrical turns.
+    """Until the mean current is the wanted one, along d, over whole electrical turns, in which the errors of sensors
+    and inverter have no mean.
 
     While the machine becomes slower, its voltage falls, and current control follows it by a constant current along q,
     for which the reference makes up with q_A.
     """
     turning.currents(drive, i_d_A, q_A)
-    window_s = max(WINDOW_S, TURNS * turning.TURN / (known.pole_pairs * abs(speed_rad_s)))
+    turn_s = turning.TURN / (known.pole_pairs * abs(speed_rad_s))
     for _ in range(WINDOWS):
-        left_A = i_d_A - mean_current(turning.advance(drive, window_s, NAME), known.offset_A)
+        rows = turning.advance(drive, max(WINDOW_S, turn_s), NAME)
+        left_A = i_d_A - mean_current(rows, known.offset_A)
         if abs(left_A) < SETTLED_SHARE * known.i_max_A:
             return
+        turned = abs(float(np.ptp(np.unwrap(rows[:, 4])))) / turning.TURN
+        if turned < 1.0:
+            turn_s = LONGER * max(WINDOW_S, turn_s) / max(turned, LEAST_TURNED)
     raise FluxtrueError(f"commission: {NAME}: {i_d_A:.3g} A along d did not settle: {abs(left_A):.2g} A are left")
 
 
@@ -214,6 +220,12 @@ def mean_current(rows: Array, offset_A: complex) -> complex:
     """Over whole turns, in the rotor frame."""
     used = whole_turns(rows)
     return complex(np.mean(used[:, 0] + 1j * used[:, 1] - offset_A * np.exp(-1j * used[:, 4])))
+
+
+def machine_currents(rows: Array, offset_A: complex) -> Array:
+    """The rows with the currents of the machine: the drive controls what the sensors show."""
+    turned = offset_A * np.exp(-1j * rows[:, 4])
+    return np.column_stack((rows[:, 0] - turned.real, rows[:, 1] - turned.imag, rows[:, 2:]))
 
 
 def voltages(rows: Array, period_s: float, periods: int = 1) -> tuple[Array, Array, float]:
@@ -259,10 +271,11 @@ def magnet(taken: list[Array], period_s: float, offset_A: complex) -> Magnet:
 def direction(drive: Capture, known: Nameplate, wanted_rad_s: float, _: Connection) -> Magnet:
     """One direction: accelerated, coasting with all levels of the current, and braked."""
     top_rad_s = _last_speed(drive, accelerate(drive, known, wanted_rad_s, NAME, TURNED))
-    taken = _coast(drive, known, top_rad_s)
+    taken = _coast(drive, known, wanted_rad_s, top_rad_s)
     found = magnet(taken, drive.period_s, known.offset_A)
     brake(drive, known, wanted_rad_s, NAME)
-    return replace(found, sensor=fit([Coasting(rows[:, 5], rows[:, 1], drive.period_s) for rows in taken]))
+    true = [machine_currents(rows, known.offset_A) for rows in taken]
+    return replace(found, sensor=fit([Coasting(rows[:, 5], rows[:, 1], drive.period_s) for rows in true]))
 
 
 def measure(drive: D, known: Nameplate, rough: Connection,
@@ -301,8 +314,9 @@ def _harmonics(ways: list[Magnet], found: Spun, known: Nameplate) -> Harmonics |
     sensors = [way.sensor for way in ways if way.sensor is not None]
     if len(sensors) < len(ways):
         return None
-    pole_pairs = found.connection.pole_pairs
-    return together(sensors, pole_pairs, 1.5 * pole_pairs * found.psi_f_Vs, known.inertia_kgm2)
+    wired = found.connection
+    torque_Nm_per_A = (-1.5 if wired.reversed else 1.5) * wired.pole_pairs * found.psi_f_Vs
+    return together(sensors, wired.pole_pairs, torque_Nm_per_A, known.inertia_kgm2)
 
 
 def _together(rounds: list[tuple[Connection, list[Magnet]]]) -> Spun:

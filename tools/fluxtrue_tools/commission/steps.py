@@ -125,6 +125,9 @@ def _drag(drive: Capture, found: Found, known: Nameplate) -> None:
         found.drag = drag.measure(drive, known, found.spun, bus_turning.runs)
     else:
         found.drag = drag.measure(drive, known, found.spun, drag.runs)
+    if found.spun.harmonics is not None:
+        with_it = found.spun.harmonics.with_inertia(found.drag.inertia_kgm2)
+        found.spun = replace(found.spun, harmonics=with_it)
 
 
 def _losses(found: Found, known: Nameplate) -> plan.Losses:

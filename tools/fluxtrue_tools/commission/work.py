@@ -17,7 +17,7 @@ import numpy as np
 from fluxtrue_tools.commission.bursts import Raw
 from fluxtrue_tools.commission.connection import Followed
 from fluxtrue_tools.commission.drag import Drag
-from fluxtrue_tools.commission.harmonics import Harmonics, Wave
+from fluxtrue_tools.commission.harmonics import Harmonics
 from fluxtrue_tools.commission.levels import Resistance
 from fluxtrue_tools.commission.plan import First
 from fluxtrue_tools.commission.spin import Spun
@@ -28,7 +28,7 @@ from fluxtrue_tools.outputs import atomic
 
 NAME: Final = "steps.json"
 TYPES: Final = {kind.__name__: kind
-               for kind in (Connection, Followed, Wave, Harmonics, Spun, Drag, Resistance, First, Raw)}  # fmt: skip
+               for kind in (Connection, Followed, Harmonics, Spun, Drag, Resistance, First, Raw)}  # fmt: skip
 KEPT: Final = ("offset_A", "offset_sigma_A", "followed", "spun", "drag", "resistance", "first", "levels")  # of Found
 LAST: Final = "map"
 

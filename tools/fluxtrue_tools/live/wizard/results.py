@@ -50,11 +50,14 @@ def _phases(found: Found, known: Nameplate, _: float) -> list[Row]:
 def _harmonics(found: Harmonics | None) -> list[Row]:
     if found is None:
         return [("Harmonics of the angle sensor", "not measured", "", "")]
-    rows = [(f"Harmonic of the angle sensor {often} per turn, electrical", f"{math.degrees(abs(wave.value_rad)):.2f}°",
-             f"{math.degrees(wave.sigma_rad):.1g}°", f"± at most {HARMONIC_DEG:g}°")
-            for often, wave in (("once", found.first), ("twice", found.second))]  # fmt: skip
-    rows.append(("The larger of three and four times per turn", f"{math.degrees(found.further_rad):.2f}°", "",
-                 f"± at most {HARMONIC_DEG:g}°"))  # fmt: skip
+    bound = f"± at most {HARMONIC_DEG:g}°" if found.is_measured else "better with the inertia, a step later"
+    names = (
+        "Harmonic of the angle sensor once per turn, electrical",
+        "Harmonic of the angle sensor twice per turn, electrical",
+        "The larger of three and four times per turn",
+    )
+    rows = [(name, f"{math.degrees(abs(wave.value_rad)):.2f}°", f"{math.degrees(wave.sigma_rad):.1g}°", bound)
+            for name, wave in zip(names, (found.first, found.second, found.further), strict=True)]  # fmt: skip
     if found.is_large:
         rows.append(("Check how the angle sensor is mounted", f"more than {math.degrees(LARGE_RAD):.0f}°", "", ""))
     return rows
@@ -85,7 +88,7 @@ def _drag(found: Found, _: Nameplate, __: float) -> list[Row]:
         torque_Nm = float(drag.torque_Nm(np.array(speed)))
         rows.append((f"Drag at {30.0 / math.pi * speed:.0f} rpm", f"{torque_Nm:.3g} N·m", "",
                      f"± at most {DRAG_SHARE * torque_Nm:.1g} N·m"))  # fmt: skip
-    return rows
+    return rows + (_harmonics(found.spun.harmonics) if found.spun is not None else [])
 
 
 def _resistance(found: Found, known: Nameplate, _: float) -> list[Row]:
