@@ -100,7 +100,7 @@ typedef struct {
     int32_t awaited_offset;     /* the search ends where sign * value + offset >= 0 */
     uint16_t at;                /* row of the next sample; `samples`: the first */
     uint16_t run;               /* samples from it on that lie side by side in the ring and in the memory; 0: unknown */
-    uint16_t filled;            /* samples since the arming, at most `samples` */
+    uint16_t filled;            /* samples since the arming, counted until enough lie before the trigger */
     uint16_t remaining;         /* samples until the end */
     uint8_t trigger_place;      /* of the trigger's signal: of the step from sizeof(sample_t) on */
     int8_t awaited_sign;        /* 1, or -1: downwards */

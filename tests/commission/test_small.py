@@ -147,7 +147,7 @@ def test_small_machines_are_of_the_size_of_small_machines(name: str, seed: int, 
     assert plant["ld_H"] == plant["lq_H"]
 
 
-def test_a_rotor_as_light_as_a_servo_does_not_pass_the_agreed_speed(small: Motor, plate: Nameplate) -> None:
+def test_a_rotor_lighter_than_a_servo_does_not_pass_the_agreed_speed(small: Motor, plate: Nameplate) -> None:
     """2 % of the largest current for the 50 ms of a try would take it beyond 30 % of the largest speed."""
     truth, flux_map, plant = hidden.draw("hub", 103, small, plate.i_max_A, connected=False)
     torque_Nm = 1.5 * plant["pole_pairs"] * truth.psi_f_Vs * plate.i_max_A

@@ -38,7 +38,7 @@ class Capture(Protocol):
     switched_off: tuple[str, ...]  # those of them that would act by the guesses of the nameplate
     passed: Callable[[float], None]  # called with the seconds for which the drive has run
     slower: float  # how many times longer it runs than software in the loop
-    is_light: bool  # pulses were refused because the rotor moved: small currents move it
+    is_light: bool  # pulses were refused because the rotor seemed to move: it is held as one that small currents move
 
     @property
     def period_s(self) -> float:

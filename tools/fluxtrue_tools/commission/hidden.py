@@ -24,9 +24,9 @@ from fluxtrue_tools.sim.motor import Motor
 
 IRON_RPM = 4000.0
 LOW_VOLTAGE_V = 60.0  # below: small machines, whose windings drop more of their voltage, at inverters with MOSFETs
-LOW_R = (0.05, 0.25)  # of the phase voltage at i_max: 0.13 to 0.33 of the five such machines in tests/motors
+LOW_R = (0.05, 0.25)  # of the phase voltage at i_max: 0.13 of ebike, 0.2 of hub and teknic; anaheim has 0.33
 LOW_DEAD_TIME = (0.3, 1.3)  # of what the nameplate assumes: 0.3 to 1.3 us at 20 kHz
-LOW_INERTIA = (5e-5, 2e-3)  # kg m^2 for each N·m of the largest torque: from a servo to a hub motor
+LOW_INERTIA = (5e-5, 2e-3)  # kg m^2 for each N·m of the largest torque: 6e-5 of anaheim; ebike and hub have more
 LOW_DRAG = (0.01, 0.04)  # of the largest torque, at the largest speed: what the current without a load amounts to
 LOW_IRON_RPM_SHARE = 0.44  # of the largest speed, as IRON_RPM of 9000 rpm
 FOLDERS = (ROOT / "firmware" / "motors", ROOT / "tests" / "motors")
@@ -113,8 +113,8 @@ def _sensors(rng: np.random.Generator, full_scale_A: float) -> dict[str, float]:
 
 
 def _connection(name: str, seed: int, pole_pairs: int) -> dict[str, float]:
-    """Nothing of how sensor and leads are connected is known. Half to twice the pole pairs of the nameplate, whose
-    largest speed would not be that of a machine with others."""
+    """Nothing of how sensor and leads are connected is known. Half to twice the pole pairs of the nameplate: with
+    others the machine would not reach the nameplate's largest speed, or could turn much faster."""
     rng = np.random.default_rng([seed, sum(name.encode()), 1])
     pairs = rng.integers(max(pole_pairs // 2, 1), 2 * pole_pairs + 1)
     return {"pole_pairs": float(pairs), "phases_swapped": float(rng.integers(0, 2)),
@@ -176,7 +176,7 @@ def draw(
 ) -> tuple[Truth, FluxMap | None, dict[str, float]]:
     """A machine for the firmware of a nameplate: its truth, its map, and the plant's parameters.
 
-    other_errors   with errors of kinds that the commissioning does not know, beside those that every machine has
+    other_errors   with those of _other_errors(), beside those that every machine has
     """
     rng = np.random.default_rng([seed, sum(name.encode())])
     model, flux_map, source_i_max = _source(folder_of(name))

@@ -29,7 +29,7 @@ CAMPAIGN: Final = Limits()
 STEPS: Final = {"map_rms": 0.01, "r_error": 0.01, "balance": 0.002, "offset_deg": 0.2,
                 "harmonics_deg": 0.2, "psi_f_error": 0.005, "inertia_error": 0.03, "drag_error": 0.1}  # fmt: skip
 """What the steps themselves must find, for 95 % of the machines; the iron loss has no bound."""
-OTHER_FACTOR: Final = 2.0  # of every bound, for errors of kinds that the commissioning does not know
+OTHER_FACTOR: Final = 2.0  # of every bound, for the machines with other errors
 STRATA: Final = (6, 4)
 DRIVE_S: Final = 60.0
 
