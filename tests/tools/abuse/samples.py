@@ -165,7 +165,7 @@ def steps() -> str:
 
     wiring = turning.Connection(4, True, 0.25)
     raw = bursts.Raw(np.array([0j, 1.5 - 2j]), np.array([3j, 4.0 + 0j]), np.array([0.1, 0.2]), np.zeros(2), 1e-4)
-    uneven = harmonics.Harmonics(harmonics.Wave(0.01 - 0.02j, 1e-4), harmonics.Wave(3e-3j, 2e-4), 5e-4)
+    uneven = harmonics.Harmonics([0.01 - 0.02j, 3e-3j, 0j, 1e-4j], [1e-4] * 4, [1e-5j] * 4, 0.07, True)
     found = Found(0.5 - 0.25j, connection.Followed(7.5, -4.01, 0.1, wiring),
                   spin.Spun(wiring, 0.08, 1e-4, 2e-4, 1e-5, 150.0, uneven),
                   drag.Drag(0.06, 1e-4, 0.1, 2e-3, 3e-6, 10.0, 100.0),
