@@ -27,7 +27,7 @@ from fluxtrue_tools.motor.config import load_config
 from fluxtrue_tools.motor.motor import Motor, load_motor
 from fluxtrue_tools.motor.names import FILE_NAME
 from fluxtrue_tools.motor.simulated import Simulated, simulated
-from fluxtrue_tools.sim.library import FluxMap
+from fluxtrue_tools.sim.library import FluxMap, Loop
 
 NAMEPLATE, TABLES, ROBUST = "nameplate", "tables", "robust"
 ALONE: Final = {"torque_loop": 0.0, "identification": 0.0}
@@ -42,6 +42,7 @@ WINDOW_SHARE: Final = 0.075  # the smallest torque of a window, as 10 N·m of hs
 CAR: Final = Vehicle()  # of a machine like hsm1
 CAR_NM, CAR_RPM = 132.0, 10000.0
 SETTLE_S: Final = 0.05
+IMPOSED: Final = {"imposed_speed": 1.0, "speed_rad_s": 0.0}  # of the plant
 FEW: Final = 4  # of so many windows one with the nameplate's tables, whose errors are large
 
 
@@ -133,15 +134,20 @@ class Coupled:
         """The plant's direction of what the firmware counts as forward."""
         return -1.0 if self.truth.plant["phases_swapped"] else 1.0
 
+    def connected(self, firmware: Built) -> Loop:
+        """The firmware and the machine, at a standstill."""
+        data = replace(firmware.data, plant={}, flux_map=self.flux_map)
+        loop = data.loop(self.truth.plant | IMPOSED)
+        loop.set("angle_pole_pairs", self.connection.pole_pairs)
+        loop.set("angle_reversed", float(self.connection.reversed))
+        loop.set("angle_offset_rad", self.connection.offset_rad)
+        return loop
+
     def rows(self, firmware: Built, plan: Plan, windows: list[Window], values: Mapping[str, float],
              warm_up: bool) -> list[dict[str, Any]]:  # fmt: skip
         """The windows whose torque the firmware takes, with these values of the firmware."""
         windows = [each for each in windows if abs(each.torque_Nm) <= firmware.motor.config.machine.torque_max_Nm]
-        data = replace(firmware.data, plant={}, flux_map=self.flux_map)
-        with data.loop(self.truth.plant | {"imposed_speed": 1.0, "speed_rad_s": 0.0}) as loop:
-            loop.set("angle_pole_pairs", self.connection.pole_pairs)
-            loop.set("angle_reversed", float(self.connection.reversed))
-            loop.set("angle_offset_rad", self.connection.offset_rad)
+        with self.connected(firmware) as loop:
             loop.record(("run_state",))
             loop.run_s(SETTLE_S)
             for name, value in values.items():

@@ -172,7 +172,8 @@ class Bound:
         return f"{self.what}: {self.value:.3g} ({sign} {self.limit:g}{'' if self.met else ', MISSED'})"
 
 
-def _of_all(driven_rows: pd.DataFrame, factor: float) -> list[Bound]:
+def of_drives(driven_rows: pd.DataFrame, factor: float) -> list[Bound]:
+    """Torque, trips and stability in all windows."""
     tables, robust = _of(driven_rows, TABLES), _of(driven_rows, ROBUST)
     low, high = _half(robust, False), _half(robust, True)
     alone = tables["error_percent"]
@@ -206,7 +207,7 @@ def bounds(table: pd.DataFrame, factor: float) -> list[Bound]:
     refused = table[table["refused"] != ""]
     found = [Bound("refused machines", float(len(refused)), 0.0)]
     rows = table[table["refused"] == ""]
-    return found + (_of_steps(rows, factor) + _of_all(rows, factor) if len(rows) else [])
+    return found + (_of_steps(rows, factor) + of_drives(rows, factor) if len(rows) else [])
 
 
 def machines_within(table: pd.DataFrame, factor: float) -> str:
