@@ -124,7 +124,7 @@ def _sensor(drive: OverTheBus, known: Nameplate, wanted_rad_s: float, wired: Con
 
     rows = drive.capture_during(SENSOR, WORDS // len(SENSOR), 1, coast)
     theta_e = wired.offset_rad + (-wired.pole_pairs if wired.reversed else wired.pole_pairs) * turning.TURN * rows[:, 0]
-    i_q_A = rows[:, 1] - (known.offset_A * np.exp(-1j * theta_e)).imag
+    i_q_A = rows[:, 1] - spin.offset_seen(theta_e, known.offset_A).imag
     found = fit([Coasting(rows[:, 0], i_q_A, drive.period_s)])
     if found is None:
         return None

@@ -21,10 +21,7 @@ COAST_S, COASTS = 0.25, 16  # the run-down ends at COAST_END of its speed
 COAST_END = 0.4
 SLOWEST = 0.1  # of the largest speed of the run: below it the drag is not evaluated
 LEAST_SHARE = 0.2  # of the largest current of the run
-BENDS = (
-    -8.0,
-    1.0,
-)  # of psi_f: what i_max along q may add to psi_d, by the slope at small currents, which is the steepest
+BENDS = (-8.0, 1.0)  # of psi_f: what i_max along q may add to psi_d with the slope at small currents, the steepest
 D = TypeVar("D", bound=Capture)
 STEADY_SHARE = 0.05  # change of a current within a window in which it counts as steady
 

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import numpy as np
 
@@ -46,12 +46,30 @@ IMPOSED: Final = {"imposed_speed": 1.0, "speed_rad_s": 0.0}  # of the plant
 FEW: Final = 4  # of so many windows one with the nameplate's tables, whose errors are large
 
 
+class Firmware(Protocol):
+    """The firmware of a motor's folder, wherever it runs."""
+
+    @property
+    def motor(self) -> Motor: ...
+
+    def connected(self, machine: "Coupled") -> Loop:
+        """With this machine, at a standstill."""
+
+
 @dataclass(frozen=True)
 class Built:
-    """A motor's folder with its firmware."""
+    """A motor's folder with its firmware, compiled for this computer."""
 
     motor: Motor
     data: Simulated
+
+    def connected(self, machine: "Coupled") -> Loop:
+        """The port is told how sensor and leads are connected."""
+        loop = replace(self.data, plant={}, flux_map=machine.flux_map).loop(machine.truth.plant | IMPOSED)
+        loop.set("angle_pole_pairs", machine.connection.pole_pairs)
+        loop.set("angle_reversed", float(machine.connection.reversed))
+        loop.set("angle_offset_rad", machine.connection.offset_rad)
+        return loop
 
 
 def built(motor: Motor, scratch: Path) -> Built:
@@ -134,20 +152,11 @@ class Coupled:
         """The plant's direction of what the firmware counts as forward."""
         return -1.0 if self.truth.plant["phases_swapped"] else 1.0
 
-    def connected(self, firmware: Built) -> Loop:
-        """The firmware and the machine, at a standstill."""
-        data = replace(firmware.data, plant={}, flux_map=self.flux_map)
-        loop = data.loop(self.truth.plant | IMPOSED)
-        loop.set("angle_pole_pairs", self.connection.pole_pairs)
-        loop.set("angle_reversed", float(self.connection.reversed))
-        loop.set("angle_offset_rad", self.connection.offset_rad)
-        return loop
-
-    def rows(self, firmware: Built, plan: Plan, windows: list[Window], values: Mapping[str, float],
+    def rows(self, firmware: Firmware, plan: Plan, windows: list[Window], values: Mapping[str, float],
              warm_up: bool) -> list[dict[str, Any]]:  # fmt: skip
         """The windows whose torque the firmware takes, with these values of the firmware."""
         windows = [each for each in windows if abs(each.torque_Nm) <= firmware.motor.config.machine.torque_max_Nm]
-        with self.connected(firmware) as loop:
+        with firmware.connected(self) as loop:
             loop.record(("run_state",))
             loop.run_s(SETTLE_S)
             for name, value in values.items():
@@ -163,11 +172,18 @@ class Coupled:
                 for k, (window, rows) in enumerate(zip(windows, trace.windows, strict=True))]  # fmt: skip
 
 
-def drive(machine: Coupled, fresh: Built, before: Built, plan: Plan) -> list[dict[str, Any]]:
-    """Before a commissioning, with its tables alone, and with the torque correction after a drive."""
-    few = plan.windows[::FEW]
-    runs = ((NAMEPLATE, before, few, GUESSED, False), (TABLES, fresh, plan.windows, ALONE, False),
-            (ROBUST, fresh, plan.windows, CORRECTED, True))  # fmt: skip
-    return [{"controller": name, "middle_rpm": plan.middle_rpm} | row
-            for name, firmware, windows, values, warm_up in runs
-            for row in machine.rows(firmware, plan, windows, values, warm_up)]  # fmt: skip
+def fresh_rows(machine: Coupled, fresh: Firmware, plan: Plan) -> list[dict[str, Any]]:
+    """With the tables of a commissioning alone, and with the torque correction after a drive."""
+    return [_head(controller, plan) | row
+            for controller, values, warm_up in ((TABLES, ALONE, False), (ROBUST, CORRECTED, True))
+            for row in machine.rows(fresh, plan, plan.windows, values, warm_up)]  # fmt: skip
+
+
+def drive(machine: Coupled, fresh: Firmware, before: Firmware, plan: Plan) -> list[dict[str, Any]]:
+    """Before a commissioning in a few windows, then fresh_rows()."""
+    guessed = machine.rows(before, plan, plan.windows[::FEW], GUESSED, warm_up=False)
+    return [_head(NAMEPLATE, plan) | row for row in guessed] + fresh_rows(machine, fresh, plan)
+
+
+def _head(controller: str, plan: Plan) -> dict[str, Any]:
+    return {"controller": controller, "middle_rpm": plan.middle_rpm}

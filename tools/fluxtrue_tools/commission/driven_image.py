@@ -9,65 +9,57 @@ that was found.
 
 import math
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import click
 import pandas as pd
 
-from fluxtrue_tools.commission import driven, folder, hidden, proof
+from fluxtrue_tools.commission import driven, proof
 from fluxtrue_tools.commission.campaign import FOLDER, draw
-from fluxtrue_tools.commission.cli import nameplate_of
-from fluxtrue_tools.commission.drive import SoftwareInTheLoop
-from fluxtrue_tools.commission.steps import chosen, run
-from fluxtrue_tools.commission.turning import TURN
+from fluxtrue_tools.commission.hidden import Truth
+from fluxtrue_tools.commission.turning import TURN, Connection
 from fluxtrue_tools.emulate import build
-from fluxtrue_tools.sim import motor as motors
+from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.sim.build import ROOT
 from fluxtrue_tools.sim.library import Loop
-from fluxtrue_tools.sim.motor import Motor
+from fluxtrue_tools.sim.motor import Motor as Simulated
 
 ANGLE = "resolver"  # absolute from the first period on
 STRATA = (2, 1)  # windows in each quadrant at the lower and at the upper speeds
 PLACE = ROOT / "build" / "commission" / "image"
-RUNS = ((driven.TABLES, driven.ALONE, False), (driven.ROBUST, driven.CORRECTED, True))
 
 
 @dataclass(frozen=True)
-class OnTheProcessor(driven.Coupled):
-    """A machine behind the emulated inverter."""
+class Flashed:
+    """A motor's folder with its image on the emulated processor."""
 
-    emulated: Motor
+    motor: Motor
+    emulated: Simulated
 
-    @property
-    def forward(self) -> float:
-        """The leads are those that the image assumes."""
-        return 1.0
+    def connected(self, machine: driven.Coupled) -> Loop:
+        """Leads and sensor are those that the image assumes."""
+        return Loop(self.emulated.library, machine.truth.plant | driven.IMPOSED, machine.flux_map)
 
-    def connected(self, firmware: driven.Built) -> Loop:
-        """The image of the folder, whatever `firmware` has been compiled for the host."""
-        left_rad = math.remainder(self.connection.offset_rad - self.truth.offset_rad, TURN)
-        right = {"phases_swapped": 0.0, "angle_reversed": 0.0, "angle_offset_rad": left_rad}
-        return Loop(self.emulated.library, self.truth.plant | right | driven.IMPOSED, self.flux_map)
+
+def _put_right(truth: Truth, found: Connection) -> Truth:
+    """The machine with leads and sensor as the report says; what is wrong with the offset that was found stays."""
+    left_rad = math.remainder(found.offset_rad - truth.offset_rad, TURN)
+    right = {"phases_swapped": 0.0, "angle_reversed": 0.0, "angle_offset_rad": left_rad}
+    return replace(truth, plant=truth.plant | right)
 
 
 def drive(name: str, seed: int, case: int, drive_s: float, strata: tuple[int, int], out: Path) -> pd.DataFrame:
     """A row for each window of both runs. The folder stays in `out`."""
-    nameplate = motors.load(str(FOLDER))
-    known = nameplate_of(FOLDER, nameplate)
-    truth, flux_map, plant = hidden.draw(name, seed, nameplate, known.i_max_A, connected=False)
-    found = run(SoftwareInTheLoop(Loop(nameplate.library, plant, flux_map)), chosen(("all",)), known, lambda _: None)
-    assert found.spun is not None
-    out.mkdir(parents=True, exist_ok=True)
-    _, made = folder.write(found, found.known(known), FOLDER, out, out)
-    plan = driven.plan_of(made, truth, case, drive_s, strata)
-    emulated = build.prepare(str(out), angle=ANGLE).emulated()
-    machine = OnTheProcessor(truth, flux_map, found.spun.connection, emulated)
-    host = driven.built(made, out)
-    head: dict[str, Any] = {"case": case, "machine": name, "seed": seed, "middle_rpm": plan.middle_rpm}
-    return pd.DataFrame([head | {"controller": controller} | row for controller, values, warm_up in RUNS
-                         for row in machine.rows(host, plan, plan.windows, values, warm_up)])  # fmt: skip
+    made = proof.commissioned(FOLDER, name, seed, False, out)
+    assert made.found.spun is not None
+    wired = made.found.spun.connection
+    plan = driven.plan_of(made.motor, made.truth, case, drive_s, strata)
+    image = Flashed(made.motor, build.prepare(str(out), angle=ANGLE).emulated())
+    machine = driven.Coupled(_put_right(made.truth, wired), made.flux_map, wired)
+    head: dict[str, Any] = {"case": case, "machine": name, "seed": seed}
+    return pd.DataFrame([head | row for row in driven.fresh_rows(machine, image, plan)])
 
 
 @click.command()

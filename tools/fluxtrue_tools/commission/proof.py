@@ -17,12 +17,14 @@ from fluxtrue_tools.commission import driven, folder, hidden, iron
 from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.drive import SoftwareInTheLoop
 from fluxtrue_tools.commission.driven import NAMEPLATE, ROBUST, TABLES
+from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import balance_error, iron_error, resistance_error, score, turned
 from fluxtrue_tools.commission.steps import Found, chosen, run
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.outputs import write_text
 from fluxtrue_tools.sim import motor as motors
-from fluxtrue_tools.sim.library import Loop
+from fluxtrue_tools.sim.library import FluxMap, Loop
 
 TABLES_RMS, TABLES_P95 = 1.5, 3.0  # percent
 CAMPAIGN: Final = Limits()
@@ -74,27 +76,44 @@ def errors(found: Found, truth: hidden.Truth, i_max_A: float) -> dict[str, float
             "lag_us": 1e6 * found.spun.lag_s, "drag_error": at.drag, "inertia_error": at.inertia}  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Commissioned:
+    """A hidden machine, what was found of it, and the folder that was written."""
+
+    truth: hidden.Truth
+    flux_map: FluxMap | None
+    known: Nameplate
+    found: Found
+    motor: Motor
+
+
+def commissioned(nameplate: Path, name: str, seed: int, other_errors: bool, out: Path) -> Commissioned:
+    """All steps with an unknown connection; the folder stays in `out`."""
+    motor = motors.load(str(nameplate))
+    known = nameplate_of(nameplate, motor)
+    truth, flux_map, plant = hidden.draw(name, seed, motor, known.i_max_A, False, other_errors)
+    out.mkdir(parents=True, exist_ok=True)
+    found = run(SoftwareInTheLoop(Loop(motor.library, plant, flux_map)), chosen(("all",)), known, lambda _: None)
+    _, made = folder.write(found, found.known(known), nameplate, out, out)
+    return Commissioned(truth, flux_map, known, found, made)
+
+
 def one(job: Job, name: str, seed: int, case: int, out: Path) -> list[dict[str, Any]]:
     """One machine: a row for each firmware and window, or one row with the refusal. Its folder stays in `out`."""
-    motor = motors.load(str(job.nameplate))
-    known = nameplate_of(job.nameplate, motor)
-    truth, flux_map, plant = hidden.draw(name, seed, motor, known.i_max_A, False, job.other_errors)
     head: dict[str, Any] = {"case": case, "machine": name, "seed": seed, "refused": ""}
-    out.mkdir(parents=True, exist_ok=True)
     try:
-        drive = SoftwareInTheLoop(Loop(motor.library, plant, flux_map))
-        found = run(drive, chosen(("all",)), known, lambda _: None)
-        _, made = folder.write(found, found.known(known), job.nameplate, out, out)
-        plan = driven.plan_of(made, truth, case, job.drive_s, job.strata)
+        made = commissioned(job.nameplate, name, seed, job.other_errors, out)
+        plan = driven.plan_of(made.motor, made.truth, case, job.drive_s, job.strata)
     except FluxtrueError as error:
         return [head | {"refused": str(error)}]
-    assert found.spun is not None
-    head |= {"pole_pairs": int(plant["pole_pairs"]), "top_rpm": plan.top_rpm, "rated_Nm": plan.rated_Nm}
-    head |= errors(found, truth, known.i_max_A)
-    connection = found.spun.connection
+    assert made.found.spun is not None
+    pole_pairs = int(made.truth.plant["pole_pairs"])
+    head |= {"pole_pairs": pole_pairs, "top_rpm": plan.top_rpm, "rated_Nm": plan.rated_Nm}
+    head |= errors(made.found, made.truth, made.known.i_max_A)
+    connection = made.found.spun.connection
     before = driven.nameplate_for(job.nameplate, connection.pole_pairs, out / "nameplate")
-    coupled = driven.Coupled(truth, flux_map, connection)
-    return [head | row for row in driven.drive(coupled, driven.built(made, out), before, plan)]
+    coupled = driven.Coupled(made.truth, made.flux_map, connection)
+    return [head | row for row in driven.drive(coupled, driven.built(made.motor, out), before, plan)]
 
 
 def campaign(

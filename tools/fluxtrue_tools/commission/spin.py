@@ -216,16 +216,21 @@ def whole_turns(rows: Array) -> Array:
     return rows[: int(np.searchsorted(np.abs(theta - theta[0]), turns * turning.TURN)) + 1] if turns else rows
 
 
+def offset_seen(theta_e_rad: Array, offset_A: complex) -> Array:
+    """Of the current sensors, in the rotor frame."""
+    return np.asarray(offset_A * np.exp(-1j * theta_e_rad))
+
+
 def mean_current(rows: Array, offset_A: complex) -> complex:
     """Over whole turns, in the rotor frame."""
     used = whole_turns(rows)
-    return complex(np.mean(used[:, 0] + 1j * used[:, 1] - offset_A * np.exp(-1j * used[:, 4])))
+    return complex(np.mean(used[:, 0] + 1j * used[:, 1] - offset_seen(used[:, 4], offset_A)))
 
 
 def machine_currents(rows: Array, offset_A: complex) -> Array:
     """The rows with the currents of the machine: the drive controls what the sensors show."""
-    turned = offset_A * np.exp(-1j * rows[:, 4])
-    return np.column_stack((rows[:, 0] - turned.real, rows[:, 1] - turned.imag, rows[:, 2:]))
+    offset = offset_seen(rows[:, 4], offset_A)
+    return np.column_stack((rows[:, 0] - offset.real, rows[:, 1] - offset.imag, rows[:, 2:]))
 
 
 def voltages(rows: Array, period_s: float, periods: int = 1) -> tuple[Array, Array, float]:
