@@ -124,14 +124,13 @@ static dq_q15_t compute_references(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
     task->torque_corrected = torque_path(drive, snapshot);
-    const voltage_reserve_t trim = update_voltage_reserve(drive, snapshot);
+    const voltage_reserve_t reserve = update_voltage_reserve(drive, snapshot);
     const current_reference_in_t in = {
         .torque_corrected = task->torque_corrected,
-        .v_dc = (q15_t)snapshot->sample.v_dc,
+        .v_plan = reserve.v_plan,
         .omega = tracked_speed_planned(snapshot),
-        .i_magnitude = fx_magnitude(task->reference.i_ref.d, task->reference.i_ref.q),
-        .v_trim = trim.v_trim,
-        .shift = trim.shift,
+        .torque_limit = task->reference.torque_limit,
+        .shift = reserve.shift,
         .psi_d_error = snapshot->psi_d_error,
         .i_d_max = i_d_limit_step(&drive->motor->i_d_limit, snapshot->psi_d_error, snapshot->winding_dC),
         .psi_q_delta = psi_q_delta(drive),
@@ -152,7 +151,8 @@ static void reset_torque_path(drive_t *drive)
     task->torque_loop = (torque_loop_state_t){0};
     task->torque_limit.loss = 0;
     task->derating = 0;
-    task->reference = (current_reference_t){.torque_max = drive->motor->torque_max, .psi_plan = Q15_MAX};
+    task->reference = (current_reference_t){
+        .torque_max = drive->motor->torque_max, .torque_limit = drive->motor->torque_max, .psi_plan = Q15_MAX};
     task->voltage_reserve = (voltage_reserve_state_t){0};
     task->allowed.torque_limited = 0;
     task->torque_commanded = 0;

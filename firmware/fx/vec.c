@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "fx/vec.h"
 
+#include "fx/codegen.h"
 #include "fx/sqrt.h"
 
 static int32_t square(int32_t x)
@@ -8,13 +9,13 @@ static int32_t square(int32_t x)
     return fx_mul_q30((q15_t)x, (q15_t)x);
 }
 
+FX_NOT_INLINED q15_t fx_root(uint32_t q30)
+{
+    return fx_sqrt_q30(q30);
+}
+
 q15_t fx_magnitude(int32_t x, int32_t y)
 {
     /* Each square is at most 2^30, so the sum, at most 2^31, fits the unsigned argument. */
-    return fx_sqrt_q30((uint32_t)square(x) + (uint32_t)square(y));
-}
-
-q15_t fx_leg(int32_t length, int32_t x)
-{
-    return fx_sqrt_q30((uint32_t)fx_max_s32(square(length) - square(x), 0));
+    return fx_root((uint32_t)square(x) + (uint32_t)square(y));
 }

@@ -2,7 +2,7 @@
 #ifndef FX_VEC_H
 #define FX_VEC_H
 
-/** Length of a vector, |v| = sqrt(x^2 + y^2), and its other component, sqrt(length^2 - x^2).
+/** Length of a vector, |v| = sqrt(x^2 + y^2), and the root of other sums and differences of squares.
  * Source   docs/theory/fixed-point.md (FX-21)
  * Units    per unit, q15
  * Range    every q15 argument, which may come in a word: only its lower half counts; lengths of 1 and more saturate to
@@ -15,7 +15,7 @@
 
 q15_t fx_magnitude(int32_t x, int32_t y);
 
-/* sqrt(length^2 - x^2); 0 if |x| exceeds the length. */
-q15_t fx_leg(int32_t length, int32_t x);
+/* fx_sqrt_q30 as a call. */
+q15_t fx_root(uint32_t q30);
 
 #endif

@@ -8,14 +8,15 @@
 #include "fx/q.h"
 #include "fx/vec.h"
 
+#define LIMIT_SHIFT 2 /* (CR-16) */
+
 motor_check_t current_reference_check(const current_reference_config_t *config)
 {
     const fx_grid_t *grid = &config->grid;
-    if (!config->i_d || !config->i_q || !config->torque_max.y) {
+    if (!config->i_d || !config->i_q || !config->torque_max) {
         return MOTOR_CHECK_REFERENCE_TABLE_MISSING;
     }
-    if (!fx_axis_valid(grid->x_shift, grid->nx) || !fx_axis_valid(grid->y_shift, grid->ny) ||
-        !fx_axis_valid(config->torque_max.shift, config->torque_max.n)) {
+    if (!fx_axis_valid(grid->x_shift, grid->nx) || !fx_axis_valid(grid->y_shift, grid->ny)) {
         return MOTOR_CHECK_REFERENCE_TABLE_GRID;
     }
     for (size_t k = 0; k < (size_t)grid->nx * grid->ny; k++) {
@@ -26,13 +27,16 @@ motor_check_t current_reference_check(const current_reference_config_t *config)
     return (config->i_max > 0) ? MOTOR_CHECK_OK : MOTOR_CHECK_CURRENT_MAX;
 }
 
-/* (v_ratio v_dc - r |i| + v_trim)/|w| - shift (CR-2), (CR-9). The quotient may reach 2^30, so that the shift has no
+/* sqrt(v_plan^2 - 2 r |w| torque)/|w| - shift (CR-2), (CR-9). The quotient may reach 2^30, so that the shift has no
  * effect at low speed, where the voltage does not limit the flux. */
-static int32_t planned_flux(const current_reference_config_t *config, const current_reference_in_t *in)
+static FX_NOT_INLINED int32_t planned_flux(const current_reference_config_t *config, const current_reference_in_t *in,
+                                           int32_t torque)
 {
-    const int32_t drop = fx_mul_gain_q15_word(config->r_pu, in->i_magnitude);
-    const int32_t voltage = fx_mul_q15(config->v_ratio, in->v_dc) - drop + in->v_trim;
-    const int32_t flux = fx_usat_q15_word(voltage) * 32768 / fx_max_s32(fx_abs_q15(in->omega), 1);
+    const int32_t speed = fx_max_s32(fx_abs_q15(in->omega), 1);
+    const int32_t v_plan = fx_usat_q15_word(in->v_plan);
+    const bool brakes = in->torque_corrected * in->omega < 0;
+    const int32_t drop = brakes ? 0 : 2 * fx_mulhi(config->r_q16 * speed, torque * 65536); /* Q30 */
+    const int32_t flux = fx_root((uint32_t)fx_max_s32(v_plan * v_plan - drop, 0)) * 32768 / speed;
     return fx_max_s32(flux - in->shift, 0);
 }
 
@@ -43,7 +47,7 @@ static dq_q15_t limit_to_current_circle(dq_q15_t i, q15_t i_max)
     if (fx_mul_q30((q15_t)i.q, (q15_t)i.q) <= i_q_squared_max) {
         return i;
     }
-    return (dq_q15_t){fx_max_s32(i.d, -i_max), fx_leg(i_max, i.d)};
+    return (dq_q15_t){fx_max_s32(i.d, -i_max), fx_root((uint32_t)fx_max_s32(i_q_squared_max, 0))};
 }
 
 static FX_NOT_INLINED dq_q15_t currents_from_table(const current_reference_config_t *config, int32_t torque,
@@ -56,8 +60,9 @@ static FX_NOT_INLINED dq_q15_t currents_from_table(const current_reference_confi
 
 static FX_NOT_INLINED int32_t torque_max_from_table(const current_reference_config_t *config, int32_t psi)
 {
+    const fx_lut1_t over_psi = {config->torque_max, config->grid.y0, config->grid.y_shift, config->grid.ny};
     bool clamped = false;
-    return fx_lookup1(&config->torque_max, psi, &clamped);
+    return fx_lookup1(&over_psi, psi, &clamped);
 }
 
 /* t_max + dpsi_d i_q - dpsi_q i_d at the currents of t_max: the tables' torque corrected by the identified flux
@@ -73,23 +78,32 @@ static q15_t torque_max_identified(const current_reference_config_t *config, con
     return (q15_t)fx_usat_q15_word(torque_max + identified);
 }
 
+/* The largest torque reduces the flux that allows it. Slow steps towards it converge where the two depend strongly on
+ * each other (CR-16). */
+static int32_t towards(int32_t torque_limit, int32_t torque_max)
+{
+    return (3 * torque_limit + torque_max) >> LIMIT_SHIFT;
+}
+
 current_reference_t current_reference_step(const current_reference_config_t *config, const current_reference_in_t *in)
 {
-    const int32_t planned = planned_flux(config, in);
-    const int32_t psi = fx_sat_q15_word(planned);
-    const int32_t torque = fx_abs_q15(in->torque_corrected);
-    const int32_t torque_max = torque_max_from_table(config, psi);
+    const int32_t planned_max = planned_flux(config, in, in->torque_limit);
+    const int32_t torque_max = torque_max_from_table(config, fx_sat_q15_word(planned_max));
+    const q15_t torque_max_reported = torque_max_identified(config, in, planned_max);
 
-    dq_q15_t i_ref = limit_to_current_circle(currents_from_table(config, fx_min_s32(torque, torque_max), psi),
-                                             config->i_max);
-    const bool i_d_limited = i_ref.d < -in->i_d_max;
-    i_ref.d = fx_max_s32(i_ref.d, -in->i_d_max); /* (CR-11) */
+    const int32_t requested = fx_abs_q15(in->torque_corrected);
+    const int32_t torque = fx_min_s32(requested, torque_max);
+    const q15_t psi = fx_sat_q15(planned_flux(config, in, torque));
+    dq_q15_t i_ref = limit_to_current_circle(currents_from_table(config, torque, psi), config->i_max);
+    const int32_t i_d = i_ref.d;
+    i_ref.d = fx_max_s32(i_d, -in->i_d_max); /* (CR-11) */
     i_ref.q = (in->torque_corrected < 0) ? -i_ref.q : i_ref.q;
     return (current_reference_t){
         .i_ref = i_ref,
-        .torque_max = torque_max_identified(config, in, planned),
-        .psi_plan = (q15_t)psi,
-        .limited = torque > torque_max || psi < config->grid.y0,
-        .i_d_limited = i_d_limited,
+        .torque_max = torque_max_reported,
+        .torque_limit = (q15_t)towards(in->torque_limit, torque_max),
+        .psi_plan = psi,
+        .limited = requested > torque_max || psi < config->grid.y0,
+        .i_d_limited = i_ref.d != i_d,
     };
 }

@@ -13,7 +13,8 @@ voltage_reserve_t voltage_reserve_step(const voltage_reserve_config_t *config, v
 {
     const int32_t psi = fx_magnitude(in->psi.d, in->psi.q);
     const int32_t with_magnet = fx_magnitude(fx_sat_q15_word(in->psi.d + in->psi_d_error), in->psi.q);
-    const int32_t reserve = fx_mul_q15(config->v_ratio, in->v_dc) - in->u;
+    const int32_t planned = fx_mul_q15(config->v_ratio, in->v_dc);
+    const int32_t reserve = planned - in->u;
     const bool on_limit = psi > in->psi_plan - (in->psi_plan >> ON_LIMIT_SHIFT);
 
     int32_t error = -fx_q15_from_q31(state->trim);
@@ -25,7 +26,7 @@ voltage_reserve_t voltage_reserve_step(const voltage_reserve_config_t *config, v
     const q31_t trim_max = 2 * config->trim_max * in->v_dc;
     state->trim = fx_clamp_q31(moved, fx_q31_from_q15(config->trim_min), trim_max);
     return (voltage_reserve_t){
-        .v_trim = fx_q15_from_q31(state->trim),
-        .shift = (q15_t)(with_magnet - psi),
+        .v_plan = planned + fx_q15_from_q31(state->trim),
+        .shift = with_magnet - psi,
     };
 }

@@ -2,7 +2,8 @@
 #ifndef TORQUE_VOLTAGE_RESERVE_H
 #define TORQUE_VOLTAGE_RESERVE_H
 /** Voltage controller of field weakening: keeps the acting voltage at its planned share of the dc voltage while the
- * flux limits the references, by a trim of the tables' input.
+ * flux limits the references, by a trim of the voltage that the references plan with.
+ *   v_plan = v_ratio v_dc + v_trim
  *   shift  = |psi + dpsi| - |psi|: contribution of the identified flux error; psi is the tables' flux at the last
  *            reference
  *   e      = v_ratio v_dc - |u|
@@ -41,8 +42,8 @@ typedef struct {
 } voltage_reserve_in_t;
 
 typedef struct {
-    q15_t v_trim;
-    q15_t shift;
+    int32_t v_plan;
+    int32_t shift;
 } voltage_reserve_t;
 
 voltage_reserve_t voltage_reserve_step(const voltage_reserve_config_t *config, voltage_reserve_state_t *state,

@@ -10,7 +10,8 @@ twin_t *twin_create(void)
     if (twin != NULL) {
         twin->motor = motor_si;
         twin->compensation = 1.0;
-        twin->reference = (twin_reference_t){.torque_max = twin->motor.torque_max_Nm, .psi_plan = HUGE_VAL};
+        twin->reference = (twin_reference_t){
+            .torque_max = twin->motor.torque_max_Nm, .torque_limit = twin->motor.torque_max_Nm, .psi_plan = HUGE_VAL};
         twin->torque_loop = true;
         twin->identification = true;
         twin->schedule.voltage_scale = 1.0;
@@ -132,10 +133,9 @@ static void torque_path(twin_t *twin)
     const double lq_error = twin->robust ? twin->identify.kalman.x[3] * twin->motor.identify_sigma[3] : 0.0;
     const twin_reference_in_t request = {
         .torque_corrected = twin_torque_loop(&twin->motor, &twin->torque_state, &torque),
-        .v_dc = twin->v_dc,
+        .v_plan = twin->motor.ref_v_ratio * twin->v_dc + twin->trim,
         .omega = twin->sample.omega,
-        .i_magnitude = hypot(twin->reference.i_ref.d, twin->reference.i_ref.q),
-        .v_trim = twin->trim,
+        .torque_limit = twin->reference.torque_limit,
         .shift = shift,
         .psi_delta = twin->psi_delta,
         .i_d_max = twin_i_d_limit(&twin->motor, twin->psi_delta, twin->winding_C),
@@ -173,7 +173,8 @@ static void task(twin_t *twin)
         twin->rotating = (twin_rotating_t){.psi = {twin->sample.flux.psi_d, twin->sample.flux.psi_q}};
         twin->torque_commanded = 0.0;
         twin->torque_state = (twin_torque_state_t){0};
-        twin->reference = (twin_reference_t){.torque_max = twin->motor.torque_max_Nm, .psi_plan = HUGE_VAL};
+        twin->reference = (twin_reference_t){
+            .torque_max = twin->motor.torque_max_Nm, .torque_limit = twin->motor.torque_max_Nm, .psi_plan = HUGE_VAL};
         twin->limit.loss_W = 0.0;
         twin->trim = 0.0;
         twin->i_ref = (twin_dq_t){0.0, 0.0};

@@ -208,12 +208,12 @@ typedef struct {
 double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state, const twin_torque_in_t *in);
 
 typedef struct {
-    double torque_corrected, v_dc, omega, i_magnitude, v_trim, shift, psi_delta, i_d_max, psi_q_delta;
+    double torque_corrected, v_plan, omega, torque_limit, shift, psi_delta, i_d_max, psi_q_delta;
 } twin_reference_in_t;
 
 typedef struct {
     twin_dq_t i_ref;
-    double torque_max, psi_plan;
+    double torque_max, torque_limit, psi_plan;
     bool limited;
 } twin_reference_t;
 

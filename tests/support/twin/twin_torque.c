@@ -48,21 +48,29 @@ double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state, con
     return in->torque_commanded + twin_clamp(wanted, -limit, limit);
 }
 
+/* (CR-2), (CR-9); beyond the table's flux by so much that the shift has no effect. */
+static double planned_flux(const motor_si_t *motor, const twin_reference_in_t *in, double torque_Nm)
+{
+    const double w = fabs(in->omega);
+    const double power = (in->torque_corrected * in->omega < 0.0) ? 0.0 : torque_Nm * w / (1.5 * motor->pole_pairs);
+    const double u = fmax(in->v_plan, 0.0);
+    const double emf = sqrt(fmax(u * u - 2.0 * motor->r_ohm_20 * power, 0.0));
+    const double psi_far_top = motor->psi0_Vs + motor->psi_step_Vs * (motor->ref_npsi - 1) + fabs(in->shift);
+    return (emf >= w * (psi_far_top + fabs(in->shift))) ? psi_far_top : fmax(emf / w - in->shift, 0.0);
+}
+
 twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_reference_in_t *in)
 {
     const twin_grid_t grid = {0.0,           motor->torque_step_Nm, motor->psi0_Vs, motor->psi_step_Vs,
                               motor->ref_nt, motor->ref_npsi};
     const twin_grid_t row = {0.0, 1.0, motor->psi0_Vs, motor->psi_step_Vs, 1, motor->ref_npsi};
     const double psi_top = motor->psi0_Vs + motor->psi_step_Vs * (motor->ref_npsi - 1);
-    const double u = fmax(motor->ref_v_ratio * in->v_dc - motor->r_ohm_20 * in->i_magnitude + in->v_trim, 0.0);
-    const double w = fabs(in->omega);
-    const double psi_far_top = psi_top + fabs(in->shift);
-    const double raw = (u >= w * (psi_far_top + fabs(in->shift))) ? psi_far_top : fmax(u / w - in->shift, 0.0);
-    const double psi = fmin(raw, psi_top);
-    const double t_max = twin_lookup(&row, motor->ref_torque_max_Nm, 0.0, psi);
+    const double planned_max = planned_flux(motor, in, in->torque_limit);
+    const double t_max = twin_lookup(&row, motor->ref_torque_max_Nm, 0.0, fmin(planned_max, psi_top));
     const double t = fmin(fabs(in->torque_corrected), t_max);
+    const double psi = fmin(planned_flux(motor, in, t), psi_top);
     const double iq = twin_lookup(&grid, motor->ref_iq_A, t, psi);
-    const double psi_far = raw + fmin(in->shift, 0.0);
+    const double psi_far = planned_max + fmin(in->shift, 0.0);
     const double t_far = twin_lookup(&row, motor->ref_torque_max_Nm, 0.0, psi_far);
     const double iq_far = twin_lookup(&grid, motor->ref_iq_A, t_far, psi_far);
     const double id_far = twin_lookup(&grid, motor->ref_id_A, t_far, psi_far);
@@ -71,6 +79,7 @@ twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_refe
         .i_ref = {fmax(twin_lookup(&grid, motor->ref_id_A, t, psi), -in->i_d_max),
                   (in->torque_corrected < 0.0) ? -iq : iq},
         .torque_max = fmax(t_far + k * (in->psi_delta * iq_far - in->psi_q_delta * id_far), 0.0),
+        .torque_limit = in->torque_limit + (t_max - in->torque_limit) / 4.0,
         .psi_plan = psi,
         .limited = fabs(in->torque_corrected) > t_max,
     };

@@ -119,9 +119,8 @@ static void reference_tables(fixture_t *f)
         .grid = {0, 2 * cell, 11, 11, NT, NPSI},
         .i_d = ref_d,
         .i_q = ref_q,
-        .torque_max = {ref_max, 2 * cell, 11, NPSI},
-        .v_ratio = q15_of(0.55),
-        .r_pu = 674,
+        .torque_max = ref_max,
+        .r_q16 = 674,
         .i_max = q15_of(0.95),
     };
     f->si.ref_nt = NT;

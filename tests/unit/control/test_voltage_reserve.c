@@ -139,7 +139,8 @@ void test_the_reserve_follows_the_twin(void)
         const voltage_reserve_t y = step();
         const double shift = twin_voltage_reserve(&f.si, &si_trim, &t);
         worst_note(&worst, y.shift - shift / f.psi * 32768.0, "shift of step %d", n);
-        worst_note(&worst, y.v_trim - si_trim / f.v * 32768.0, "trim of step %d", n);
+        const double v_plan = f.si.ref_v_ratio * t.v_dc + si_trim;
+        worst_note(&worst, y.v_plan - v_plan / f.v * 32768.0, "planned voltage of step %d", n);
     }
     ASSERT_WORST(worst, 3.0);
 }

@@ -136,7 +136,6 @@ void test_torque_loop_references_and_monitors_are_the_si_values(void)
     HELD(motor_si.torque_authority, q15(motor.parameters.torque_loop.authority), q15(1));
     HELD(motor_si.torque_min_Nm / t_b, q15(motor.parameters.torque_loop.torque_min), q15(1));
     HELD(motor_si.torque_max_Nm / t_b, q15(motor.torque_max), q15(1));
-    HELD(motor_si.ref_v_ratio, q15(motor.current_reference.v_ratio), q15(1));
     HELD(motor_si.i_max_A / i_b, q15(motor.current_reference.i_max), q15(1));
     HELD(motor_si.ref_v_ratio, q15(motor.voltage_reserve.v_ratio), q15(1));
     HELD(motor_si.trim_gain, q15(motor.voltage_reserve.gain), q15(1));
@@ -178,11 +177,11 @@ void test_the_flux_tables_agree_with_the_unquantised_ones(void)
 
 static current_reference_t reference(double torque_Nm, double psi_Vs)
 {
-    /* The speed at which the planned voltage allows exactly this flux. */
+    /* The speed at which the planned voltage allows exactly this flux without a torque. */
     const double v = motor_si.v_dc_full_scale_V * 0.7;
     const double w = motor_si.ref_v_ratio * v / psi_Vs;
     const current_reference_in_t in = {.torque_corrected = (q15_t)lround(torque_Nm / t_b * 32768.0),
-                                       .v_dc = (q15_t)lround(v / v_b * 32768.0),
+                                       .v_plan = (int32_t)lround(motor_si.ref_v_ratio * v / v_b * 32768.0),
                                        .omega = (q15_t)lround(fmin(w / w_b, 0.9999) * 32768.0),
                                        .i_d_max = INT16_MAX};
     return current_reference_step(&motor.current_reference, &in);

@@ -58,10 +58,9 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     X(FLUX_TABLE_VALUE, m.flux_table.g = flux(motor.flux_table.g, -1)) \
     X(REFERENCE_TABLE_MISSING, m.current_reference.i_d = 0) \
     X(REFERENCE_TABLE_MISSING, m.current_reference.i_q = 0) \
-    X(REFERENCE_TABLE_MISSING, m.current_reference.torque_max.y = 0) \
+    X(REFERENCE_TABLE_MISSING, m.current_reference.torque_max = 0) \
     X(REFERENCE_TABLE_GRID, m.current_reference.grid.nx = 1) \
     X(REFERENCE_TABLE_GRID, m.current_reference.grid.ny = 1) \
-    X(REFERENCE_TABLE_GRID, m.current_reference.torque_max.n = 1) \
     X(REFERENCE_TABLE_VALUE, m.current_reference.i_d = reference(motor.current_reference.i_d, 1)) \
     X(REFERENCE_TABLE_VALUE, m.current_reference.i_q = reference(motor.current_reference.i_q, -1)) \
     X(CURRENT_MAX, m.current_reference.i_max = 0)

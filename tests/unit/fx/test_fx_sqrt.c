@@ -93,17 +93,11 @@ void test_the_corners_of_the_square_have_the_largest_length(void)
 }
 
 /* Pythagorean triples; the tolerance is the 0.7 LSB of the root. */
-void test_the_other_component_of_a_vector_is_the_leg_of_its_triangle(void)
+void test_the_root_of_a_difference_of_squares_is_the_leg_of_its_triangle(void)
 {
-    TEST_ASSERT_INT16_WITHIN(1, 4000, fx_leg(5000, 3000));
-    TEST_ASSERT_INT16_WITHIN(1, 3000, fx_leg(5000, -4000));
-    TEST_ASSERT_INT16_WITHIN(1, 5, fx_leg(13, 12));
-    TEST_ASSERT_EQUAL_INT16(0, fx_leg(5000, 5000));
-    TEST_ASSERT_EQUAL_INT16(32767, fx_leg(Q15_MIN, 0));
-}
-
-void test_a_component_longer_than_the_vector_gives_zero(void)
-{
-    TEST_ASSERT_EQUAL_INT16(0, fx_leg(5000, 5001));
-    TEST_ASSERT_EQUAL_INT16(0, fx_leg(0, Q15_MIN));
+    TEST_ASSERT_INT16_WITHIN(1, 4000, fx_root((5000 * 5000) - (3000 * 3000)));
+    TEST_ASSERT_INT16_WITHIN(1, 5, fx_root((13 * 13) - (12 * 12)));
+    TEST_ASSERT_EQUAL_INT16(0, fx_root(0));
+    TEST_ASSERT_EQUAL_INT16(32767, fx_root(1U << 30));
+    TEST_ASSERT_EQUAL_INT16(32767, fx_root(UINT32_MAX));
 }

@@ -203,15 +203,14 @@ CALLED void task_reference(void)
         .psi_d_error = snapshot.psi_d_error,
         .acting = snapshot.sample.acting,
     };
-    const voltage_reserve_t trim = voltage_reserve_step(&d->motor->voltage_reserve, &d->task.voltage_reserve, &voltage);
-    const dq_q15_t i_ref = d->task.reference.i_ref;
+    const voltage_reserve_t reserve = voltage_reserve_step(&d->motor->voltage_reserve, &d->task.voltage_reserve,
+                                                           &voltage);
     const current_reference_in_t in = {
         .torque_corrected = d->task.torque_corrected,
-        .v_dc = (q15_t)snapshot.sample.v_dc,
+        .v_plan = reserve.v_plan,
         .omega = fx_q15_from_q31(snapshot.sample.point.omega),
-        .i_magnitude = fx_magnitude((q15_t)i_ref.d, (q15_t)i_ref.q),
-        .v_trim = trim.v_trim,
-        .shift = trim.shift,
+        .torque_limit = d->task.reference.torque_limit,
+        .shift = reserve.shift,
         .psi_d_error = snapshot.psi_d_error,
         .i_d_max = i_d_limit_step(&d->motor->i_d_limit, snapshot.psi_d_error, snapshot.winding_dC),
         .psi_q_delta = 0,

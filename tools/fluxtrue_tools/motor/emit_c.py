@@ -52,7 +52,7 @@ from fluxtrue_tools.motor.derived import (
     turning_knee_A_per_rad,
 )
 from fluxtrue_tools.motor.motor import Motor
-from fluxtrue_tools.motor.quantise import Q15_ONE, Unfit, q15, q16, q31, u16
+from fluxtrue_tools.motor.quantise import Q15_ONE, Q16_ONE, Unfit, q15, q16, q31, u16
 from fluxtrue_tools.motor.second_level import make_second_level
 
 Row = tuple[str, object, str]  # member, literal, comment
@@ -337,19 +337,12 @@ def _torque_loop(motor: Motor) -> list[Row]:
 
 def _current_reference(motor: Motor) -> list[Row]:
     refs, b = motor.references, motor.bases
-    lut: list[Row] = [
-        ("y", "table_ref_torque_max", ""),
-        ("x0", refs.y0, ""),
-        ("shift", f"{refs.shift}u", ""),
-        ("n", f"{len(refs.psi_Vs)}u", ""),
-    ]
     return [
         ("grid", _grid(0, refs.y0, refs.shift, refs.id_A.shape), ""),
         ("i_d", "table_ref_i_d", ""),
         ("i_q", "table_ref_i_q", ""),
-        ("torque_max", lut, ""),
-        ("v_ratio", q15(motor.derived.ref_v_ratio, "ref v_ratio"), f"{motor.derived.ref_v_ratio:.6g}"),
-        ("r_pu", q16(motor.config.machine.r_ohm / b.resistance_ohm, "r_pu"), "R at 20 C"),
+        ("torque_max", "table_ref_torque_max", ""),
+        ("r_q16", f"{u16(motor.config.machine.r_ohm / b.resistance_ohm, Q16_ONE, 'r_pu')}u", "R at 20 C"),
         ("i_max", q15(motor.config.machine.i_max_A / b.current_A, "i_max"), f"{motor.config.machine.i_max_A:g} A"),
     ]
 
