@@ -58,6 +58,8 @@ class Solver:
         self.model, self.pole_pairs, self.i_max_A = model, pole_pairs, i_max_A
         self.id_A = np.linspace(-i_max_A, 0.0, POINTS)
         self.iq_A = np.linspace(0.0, i_max_A, POINTS)
+        reach = np.sqrt(np.maximum(i_max_A**2 - self.id_A * self.id_A, 0.0)) + i_max_A / POINTS * 3
+        self.points = np.maximum(np.searchsorted(self.iq_A, reach), 2)  # of iq_A, up to beyond the current circle
         d, q = np.meshgrid(self.id_A, self.iq_A, indexing="ij")
         self.plane = torque(model, pole_pairs, d, q)
         inside = np.hypot(d, q) <= i_max_A
@@ -91,11 +93,10 @@ class Solver:
         return q
 
     def _start(self, torques: Array) -> Array:
-        rows = []
-        for row, d in zip(self.plane, self.id_A, strict=True):
-            reach = math.sqrt(max(self.i_max_A**2 - d * d, 0.0)) + self.i_max_A / POINTS * 3
-            n = max(int(np.searchsorted(self.iq_A, reach)), 2)
-            rows.append(np.interp(torques, row[:n], self.iq_A[:n], right=np.nan))
+        rows = [
+            np.interp(torques, row[:n], self.iq_A[:n], right=np.nan)
+            for row, n in zip(self.plane, self.points, strict=True)
+        ]
         return np.array(rows)
 
     def contours(self, torques: Array) -> list[Contour]:
@@ -105,32 +106,47 @@ class Solver:
         ok = np.isfinite(start)
         q = np.full_like(start, np.nan)
         q[ok] = self.iq_for(np.broadcast_to(torques, d.shape)[ok], d[ok], start[ok])
-        return self._solved(torques, [self._near(q[:, k]) for k in range(len(torques))])
+        return self._solved(torques, self._near(q))
 
-    def _near(self, q: Array) -> tuple[Array, Array]:
-        """Currents near one contour, from its MTPA point to the current circle; q: i_q over self.id_A."""
+    def _near(self, q: Array) -> list[tuple[Array, Array]]:
+        """Currents near each contour, from its MTPA point to the current circle; q: i_q over self.id_A [i_d][contour].
+
+        What all contours have in common is found of all at once: a call of NumPy takes longer than its work on one.
+        """
+        q = np.ascontiguousarray(q.T)
         current = np.hypot(self.id_A, q)
-        inside = np.nan_to_num(current, nan=np.inf) <= self.i_max_A
-        if not inside.any():
-            return np.array([self.id_top_A]), np.array([self.iq_top_A])
-        best = int(np.argmin(np.where(inside, current, np.inf)))
-        d_best = self.id_A[best]
-        if 0 < best < POINTS - 1 and np.isfinite(q[best - 1]) and np.isfinite(q[best + 1]):
+        inside = current <= self.i_max_A  # not where it is NaN
+        best = np.argmin(np.where(inside, current, np.inf), axis=1)
+        first = np.argmax(inside, axis=1)
+        known, reached = np.isfinite(q), inside.any(axis=1)
+        return [
+            self._near_one(q[k], current[k], inside[k], known[k], int(best[k]), int(first[k]))
+            if reached[k]
+            else (np.array([self.id_top_A]), np.array([self.iq_top_A]))
+            for k in range(len(q))
+        ]
+
+    def _near_one(
+        self, q: Array, current: Array, inside: Array, known: Array, best: int, first: int
+    ) -> tuple[Array, Array]:
+        id_A = self.id_A
+        d_best = id_A[best]
+        if 0 < best < POINTS - 1 and known[best - 1] and known[best + 1]:
             left, mid, right = (current[best + k] ** 2 for k in (-1, 0, 1))
-            d_best += 0.5 * (left - right) / (left - 2 * mid + right) * (self.id_A[1] - self.id_A[0])
-        first = int(np.argmax(inside))
-        ids = np.concatenate(([d_best], self.id_A[:best][inside[:best]][::-1]))
-        if len(ids) > 1 and ids[0] - ids[1] < 1e-6:
-            ids = np.delete(ids, 1)
+            d_best += 0.5 * (left - right) / (left - 2 * mid + right) * (id_A[1] - id_A[0])
+        ids = id_A[:best][inside[:best]][::-1]
+        if len(ids) and d_best - ids[0] < 1e-6:
+            ids = ids[1:]
+        ids = np.concatenate(([d_best], ids))
         ids = ids[ids <= d_best]
-        known = np.isfinite(q)
-        qs = np.interp(ids, self.id_A[known], q[known])
+        qs = np.interp(ids, id_A[known], q[known])
         if first > 0 and known[first - 1]:
             inner, outer = current[first] - self.i_max_A, current[first - 1] - self.i_max_A
             share = inner / (inner - outer)
-            d_rim = self.id_A[first] + share * (self.id_A[first - 1] - self.id_A[first])
+            d_rim = id_A[first] + share * (id_A[first - 1] - id_A[first])
             if d_rim < ids[-1] - 1e-6:
-                ids, qs = np.append(ids, d_rim), np.append(qs, q[first] + share * (q[first - 1] - q[first]))
+                q_rim = q[first] + share * (q[first - 1] - q[first])
+                ids, qs = np.concatenate((ids, [d_rim])), np.concatenate((qs, [q_rim]))
         return ids, qs
 
     def _solved(self, torques: Array, near: list[tuple[Array, Array]]) -> list[Contour]:
@@ -139,14 +155,17 @@ class Solver:
         t = np.repeat(torques, lengths)
         d = np.concatenate([d for d, _ in near])
         q = self.iq_for(t, d, np.concatenate([q for _, q in near]))
-        parts = (np.split(values, np.cumsum(lengths)[:-1]) for values in (d, q, flux(self.model, d, q)))
-        return [_falling(float(t), *part) for t, *part in zip(torques, *parts, strict=True)]
+        psi = flux(self.model, d, q)
+        rises = np.diff(psi) >= 0
+        return [
+            _falling(float(t), d[end - n : end], q[end - n : end], psi[end - n : end], rises[end - n : end - 1])
+            for t, n, end in zip(torques, lengths, np.cumsum(lengths).tolist(), strict=True)
+        ]
 
 
-def _falling(t: float, d: Array, q: Array, psi: Array) -> Contour:
+def _falling(t: float, d: Array, q: Array, psi: Array, rises: Array) -> Contour:
     """A contour up to its least flux: beyond it the flux rises again (maximum torque per volt)."""
-    rises = np.flatnonzero(np.diff(psi) >= 0)
-    last = int(rises[0]) + 1 if len(rises) else len(psi)
+    last = int(np.argmax(rises)) + 1 if rises.any() else len(psi)
     return Contour(t, d[:last], q[:last], psi[:last])
 
 
