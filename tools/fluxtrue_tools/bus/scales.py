@@ -11,9 +11,11 @@ Source   docs/decisions/018-bus-scales.md
 import math
 import re
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Decimal
-from functools import cache
+from functools import cache, lru_cache
+from types import MappingProxyType
 from typing import Final
 
 from fluxtrue_tools.bus import DBC
@@ -29,6 +31,8 @@ RESOLUTION: Final = Decimal("0.001")  # of the rated value
 RESERVE: Final = Decimal("1.2")  # of the largest value
 HASH: Final = "InterfaceHash"
 MATCHES: Final = "this_file"
+KEPT: Final = 64
+"""Texts of which the results are kept: the search for values that fit tries thousands, nearly all with one DBC."""
 
 _BUS = re.compile(r"^BO_ (\d+) (\w+):", re.MULTILINE)
 _SIGNAL = re.compile(
@@ -68,7 +72,8 @@ def standard() -> str:
     return DBC.read_text(encoding="utf-8")
 
 
-def carriers(text: str) -> dict[str, Carrier]:
+@lru_cache(maxsize=KEPT)
+def carriers(text: str) -> Mapping[str, Carrier]:
     """Each quantity as the DBC carries it; a quantity with two factors is an error."""
     found: dict[str, Carrier] = {}
     for match in _SIGNAL.finditer(text):
@@ -81,14 +86,15 @@ def carriers(text: str) -> dict[str, Carrier]:
         if before.factor != factor or Decimal(match[8]) != 0:
             raise FluxtrueError(f"{DBC.name}: {match[2]}: signals in {match[12]} must have one factor and no offset")
         found[name] = Carrier(factor, min(before.counts, counts))
-    return found
+    return MappingProxyType(found)
 
 
-def series(around: Decimal) -> list[Decimal]:
+@cache
+def series(around: Decimal) -> tuple[Decimal, ...]:
     """1, 2 and 5 times powers of ten, the nearest to `around` first; equally near ones with the finer first."""
     decade = around.adjusted()
     steps = [Decimal(digit).scaleb(decade + n) for n in range(-9, 10) for digit in (1, 2, 5)]
-    return sorted(steps, key=lambda step: (abs(math.log10(step / around)), step))
+    return tuple(sorted(steps, key=lambda step: (abs(math.log10(step / around)), step)))
 
 
 def factor_for(carrier: Carrier, need: Need) -> Decimal:
@@ -147,6 +153,7 @@ def declared(text: str) -> list[str]:
     return sorted(lines)
 
 
+@lru_cache(maxsize=KEPT)
 def interface_hash(text: str) -> int:
     """CRC-32 over version and signals: it changes with a name, a place, a factor or a unit, not with a comment."""
     version = _VERSION.search(text)
@@ -163,6 +170,11 @@ def with_hash(text: str) -> str:
     return text[: line.start(1)] + str(interface_hash(text)) + text[line.end(1) :]
 
 
+@lru_cache(maxsize=KEPT)
+def _dbc_of(factors: tuple[tuple[str, Decimal], ...]) -> str:
+    return with_hash(with_factors(standard(), dict(factors)))
+
+
 def dbc_of(factors: Factors) -> str:
     """The DBC of a motor with these factors."""
-    return with_hash(with_factors(standard(), factors))
+    return _dbc_of(tuple(factors.items()))

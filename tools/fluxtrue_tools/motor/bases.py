@@ -3,11 +3,12 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from fluxtrue_tools.motor.config import MotorConfig
-from fluxtrue_tools.motor.flux_model import FluxModel, flux
+from fluxtrue_tools.motor.flux_model import MODELS_KEPT, FluxModel, flux
 from fluxtrue_tools.motor.quantise import Unfit
 
 VOLTAGE_PER_VDC = 1.5
@@ -43,6 +44,7 @@ def periods_per_step(pwm_hz: float) -> int:
     return math.floor(pwm_hz / TASK_HZ + 0.5)
 
 
+@lru_cache(maxsize=MODELS_KEPT)
 def flux_max(model: FluxModel, i_max_A: float) -> float:
     """Largest |psi| on the i_max half circle i_d <= 0, and of the magnet alone."""
     angle = np.linspace(0.5 * np.pi, np.pi, 181)
@@ -50,6 +52,7 @@ def flux_max(model: FluxModel, i_max_A: float) -> float:
     return float(max(rim.max(), flux(model, 0.0, 0.0)))
 
 
+@lru_cache(maxsize=MODELS_KEPT)
 def inductance_min(model: FluxModel, i_max_A: float) -> float:
     """Smallest incremental inductance of both axes inside the i_max circle, i_d <= 0."""
     d, q = np.meshgrid(np.linspace(-i_max_A, 0, 101), np.linspace(0, i_max_A, 101), indexing="ij")

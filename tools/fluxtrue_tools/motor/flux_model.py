@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Flux linkages over the current plane: a spline through a measured map, or three constants."""
 
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +10,9 @@ from scipy.interpolate import PchipInterpolator, RectBivariateSpline
 from fluxtrue_tools.motor.bicubic import Bicubic, Place
 
 Array = NDArray[np.float64]
+
+MODELS_KEPT: Final = 8
+"""Models of which a number is kept that depends on them alone; a model does not change once it is made."""
 
 
 class FluxModel(Protocol):

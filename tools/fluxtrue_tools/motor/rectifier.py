@@ -2,12 +2,13 @@
 """At which back-EMF the diodes of a bridge that is switched off can keep currents flowing, without any loss."""
 
 import math
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 from scipy.optimize import brentq
 
-from fluxtrue_tools.motor.flux_model import Array, FluxModel
+from fluxtrue_tools.motor.flux_model import MODELS_KEPT, Array, FluxModel
 
 POINTS: Final = 401  # along i_d
 BISECTIONS: Final = 40
@@ -33,6 +34,7 @@ def _orthogonal_iq_A(model: FluxModel, i_d: Array, top_A: float) -> Array:
     return 0.5 * (low + high)
 
 
+@lru_cache(maxsize=MODELS_KEPT)
 def largest_flux_share(model: FluxModel) -> float:
     """kappa, the largest flux of a machine that generates into diodes, over that of its magnets alone, which is not 0:
     a machine without magnets is refused when its data are read."""
