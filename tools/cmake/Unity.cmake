@@ -65,6 +65,24 @@ function(_fluxtrue_mock header folder sources)
     set(${sources} "${mock}" PARENT_SCOPE)
 endfunction()
 
+# The mock of one header as a library of objects, made once for all tests that use it. Its folder holds nothing else: a
+# test finds the copies of the headers that it mocks, and every other header as it is.
+function(_fluxtrue_mock_library header target folder)
+    string(MAKE_C_IDENTIFIER "${header}" name)
+    set(library "fluxtrue_mock_${name}")
+    set(own "${CMAKE_BINARY_DIR}/mocks/${name}")
+    set(${target} "${library}" PARENT_SCOPE)
+    set(${folder} "${own}" PARENT_SCOPE)
+    if(TARGET ${library})
+        return()
+    endif()
+    _fluxtrue_mock("${header}" "${own}" mock)
+    add_library(${library} OBJECT "${mock}")
+    target_include_directories(${library} BEFORE PRIVATE "${own}")
+    target_include_directories(${library} PRIVATE "${CMAKE_SOURCE_DIR}/firmware" "${CMAKE_SOURCE_DIR}")
+    target_link_libraries(${library} PRIVATE fluxtrue_firmware fluxtrue_unity fluxtrue_strict fluxtrue_covered)
+endfunction()
+
 # fluxtrue_unity_test(NAME <n> SOURCES <test.c> [<more.c> ...] [LIBS <layer or library> ...]
 #                     [MOCKS hal/adc.h ...] [MOTOR <shipped motor>] [INCLUDES <folder> ...]
 #                     [DEFINITIONS <D> ...] [LABELS <label> ...])
@@ -92,14 +110,13 @@ function(fluxtrue_unity_test)
         COMMENT "Test runner of ${arg_NAME}"
         VERBATIM)
     set_source_files_properties("${runner}" PROPERTIES COMPILE_OPTIONS -w)
-    set(mocks "")
+    add_executable(${arg_NAME} "${test}" ${arg_SOURCES} "${runner}")
     foreach(header IN LISTS arg_MOCKS)
-        _fluxtrue_mock("${header}" "${folder}" mock)
-        list(APPEND mocks "${mock}")
+        _fluxtrue_mock_library("${header}" mock copy)
+        target_sources(${arg_NAME} PRIVATE $<TARGET_OBJECTS:${mock}>)
+        add_dependencies(${arg_NAME} ${mock}) # the mock's header, too
+        target_include_directories(${arg_NAME} BEFORE PRIVATE "${copy}")
     endforeach()
-
-    add_executable(${arg_NAME} "${test}" ${arg_SOURCES} "${runner}" ${mocks})
-    target_include_directories(${arg_NAME} BEFORE PRIVATE "${folder}")
     target_include_directories(${arg_NAME} PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}"
         "${CMAKE_SOURCE_DIR}/firmware" "${CMAKE_SOURCE_DIR}/tests"
         "${CMAKE_SOURCE_DIR}/tests/support" "${CMAKE_SOURCE_DIR}" ${arg_INCLUDES})
