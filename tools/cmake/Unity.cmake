@@ -83,6 +83,56 @@ function(_fluxtrue_mock_library header target folder)
     target_link_libraries(${library} PRIVATE fluxtrue_firmware fluxtrue_unity fluxtrue_strict fluxtrue_covered)
 endfunction()
 
+# What the sources of a test are compiled with and linked to; arg_ are the arguments of fluxtrue_unity_test.
+function(_fluxtrue_unity_environment target)
+    foreach(header IN LISTS arg_MOCKS)
+        _fluxtrue_mock_library("${header}" mock copy)
+        add_dependencies(${target} ${mock}) # the mock's header
+        target_include_directories(${target} BEFORE PRIVATE "${copy}")
+    endforeach()
+    target_include_directories(${target} PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}"
+        "${CMAKE_SOURCE_DIR}/firmware" "${CMAKE_SOURCE_DIR}/tests"
+        "${CMAKE_SOURCE_DIR}/tests/support" "${CMAKE_SOURCE_DIR}" ${arg_INCLUDES})
+    target_compile_definitions(${target} PRIVATE ${arg_DEFINITIONS})
+    foreach(library IN LISTS arg_LIBS)
+        if(TARGET fluxtrue_${library})
+            set(library fluxtrue_${library})
+        elseif(NOT TARGET ${library} AND NOT library STREQUAL m)
+            message(FATAL_ERROR "fluxtrue_unity_test(${arg_NAME}): no library '${library}'")
+        endif()
+        target_link_libraries(${target} PRIVATE ${library})
+    endforeach()
+    target_link_libraries(${target} PRIVATE fluxtrue_unity m)
+    target_link_libraries(${target} PRIVATE fluxtrue_strict fluxtrue_covered)
+endfunction()
+
+# Adds sources to a test. Those below tests/ are compiled once for all tests of the folder that have the same ones and
+# compile them in the same way. The firmware's stay the test's own: there tools/fluxtrue mutate searches a source that a
+# test compiles with other definitions.
+function(_fluxtrue_unity_sources)
+    set(common "")
+    foreach(source IN LISTS ARGN)
+        cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
+        cmake_path(IS_PREFIX CMAKE_CURRENT_SOURCE_DIR "${source}" is_here)
+        if(is_here AND "${arg_DEFINITIONS}" STREQUAL "")
+            list(APPEND common "${source}")
+        else()
+            target_sources(${arg_NAME} PRIVATE "${source}")
+        endif()
+    endforeach()
+    if(common)
+        string(MD5 key "${common}|${arg_MOCKS}|${arg_LIBS}|${arg_INCLUDES}")
+        string(SUBSTRING "${key}" 0 8 key)
+        cmake_path(GET CMAKE_CURRENT_SOURCE_DIR FILENAME place)
+        set(library fluxtrue_common_${place}_${key})
+        if(NOT TARGET ${library})
+            add_library(${library} OBJECT ${common})
+            _fluxtrue_unity_environment(${library})
+        endif()
+        target_sources(${arg_NAME} PRIVATE $<TARGET_OBJECTS:${library}>)
+    endif()
+endfunction()
+
 # fluxtrue_unity_test(NAME <n> SOURCES <test.c> [<more.c> ...] [LIBS <layer or library> ...]
 #                     [MOCKS hal/adc.h ...] [MOTOR <shipped motor>] [INCLUDES <folder> ...]
 #                     [DEFINITIONS <D> ...] [LABELS <label> ...])
@@ -110,32 +160,18 @@ function(fluxtrue_unity_test)
         COMMENT "Test runner of ${arg_NAME}"
         VERBATIM)
     set_source_files_properties("${runner}" PROPERTIES COMPILE_OPTIONS -w)
-    add_executable(${arg_NAME} "${test}" ${arg_SOURCES} "${runner}")
+    add_executable(${arg_NAME} "${test}" "${runner}")
+    _fluxtrue_unity_sources(${arg_SOURCES})
+    _fluxtrue_unity_environment(${arg_NAME})
     foreach(header IN LISTS arg_MOCKS)
         _fluxtrue_mock_library("${header}" mock copy)
         target_sources(${arg_NAME} PRIVATE $<TARGET_OBJECTS:${mock}>)
-        add_dependencies(${arg_NAME} ${mock}) # the mock's header, too
-        target_include_directories(${arg_NAME} BEFORE PRIVATE "${copy}")
     endforeach()
-    target_include_directories(${arg_NAME} PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}"
-        "${CMAKE_SOURCE_DIR}/firmware" "${CMAKE_SOURCE_DIR}/tests"
-        "${CMAKE_SOURCE_DIR}/tests/support" "${CMAKE_SOURCE_DIR}" ${arg_INCLUDES})
-    target_compile_definitions(${arg_NAME} PRIVATE ${arg_DEFINITIONS})
     # The generated runner calls the test functions by name: they have no prototypes.
     set_source_files_properties("${test}" PROPERTIES COMPILE_OPTIONS -Wno-missing-prototypes)
     if(arg_MOTOR)
         target_sources(${arg_NAME} PRIVATE $<TARGET_OBJECTS:motor_${arg_MOTOR}>)
     endif()
-    foreach(library IN LISTS arg_LIBS)
-        if(TARGET fluxtrue_${library})
-            set(library fluxtrue_${library})
-        elseif(NOT TARGET ${library} AND NOT library STREQUAL m)
-            message(FATAL_ERROR "fluxtrue_unity_test(${arg_NAME}): no library '${library}'")
-        endif()
-        target_link_libraries(${arg_NAME} PRIVATE ${library})
-    endforeach()
-    target_link_libraries(${arg_NAME} PRIVATE fluxtrue_unity m)
-    target_link_libraries(${arg_NAME} PRIVATE fluxtrue_strict fluxtrue_covered)
 
     if(NOT arg_LABELS)
         set(arg_LABELS unit)
