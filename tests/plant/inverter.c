@@ -53,7 +53,7 @@ static void current_gain(const machine_t *m, double h, rotation_t end, double ga
     for (int y = 0; y < 3; y++) {
         double dq[2], di[2], ab[2], abc[3];
         to_rotor(end, phase_axis[y], dq);
-        flux_divide(m->jac, dq, di);
+        flux_solve_step(m->jac, m->per_det, dq, di);
         to_stationary(end, di, ab);
         to_phases(ab, abc);
         for (int x = 0; x < 3; x++) {

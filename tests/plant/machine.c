@@ -34,16 +34,20 @@ static void model_flux(const void *context, const double i[2], double psi[2], do
         psi[1] = f->lq_H * i[1];
         return;
     }
-    double psi_d, psi_q, slope_H;
-    plant_map_flux(f->map, i[0], i[1], &psi_d, &psi_q, jac);
-    psi[0] = f->slope * psi_d + f->offset_Vs;
-    psi[1] = f->q * psi_q;
+    double slope_H = 0.0, axis_Vs = 0.0;
+    if (f->cross != 0.0) {
+        axis_Vs = plant_map_both(f->map, i, psi, jac, &slope_H);
+    } else {
+        plant_map_flux(f->map, i[0], i[1], &psi[0], &psi[1], jac);
+    }
+    psi[0] = f->slope * psi[0] + f->offset_Vs;
+    psi[1] *= f->q;
     jac[0] *= f->slope;
     jac[1] *= f->slope;
     jac[2] *= f->q;
     jac[3] *= f->q;
     if (f->cross != 0.0) {
-        psi[0] += f->cross * plant_map_axis_flux(f->map, i[1], &slope_H);
+        psi[0] += f->cross * axis_Vs;
         jac[1] += f->cross * slope_H;
     }
 }
@@ -59,6 +63,7 @@ static void search_current(machine_t *m, double i[2])
     }
     memcpy(m->im_dq, i, sizeof m->im_dq);
     memcpy(m->jac, jac, sizeof jac);
+    m->per_det = flux_per_det(jac);
 }
 
 /* start is the linear prediction: one Newton step usually suffices. If the step is larger than 1e-3 A, its quadratic
@@ -69,12 +74,14 @@ static void find_current(machine_t *m, const double start[2])
     model_flux(&m->flux, i, psi, jac);
     r[0] = m->psi_dq[0] - psi[0];
     r[1] = m->psi_dq[1] - psi[1];
-    flux_divide(jac, r, step);
+    const double per_det = flux_per_det(jac);
+    flux_solve_step(jac, per_det, r, step);
     i[0] += step[0];
     i[1] += step[1];
     if (fabs(step[0]) + fabs(step[1]) < 1e-3) {
         memcpy(m->im_dq, i, sizeof i);
         memcpy(m->jac, jac, sizeof jac);
+        m->per_det = per_det;
         return;
     }
     if (!isfinite(i[0]) || !isfinite(i[1])) {
@@ -86,6 +93,7 @@ static void find_current(machine_t *m, const double start[2])
 static void set_flux_from_current(machine_t *m, rotation_t rotor)
 {
     model_flux(&m->flux, m->im_dq, m->psi_dq, m->jac);
+    m->per_det = flux_per_det(m->jac);
     to_stationary(rotor, m->psi_dq, m->psi_s);
 }
 
@@ -140,12 +148,6 @@ void machine_set_current(machine_t *m, const double im_dq[2], rotation_t rotor)
     set_flux_from_current(m, rotor);
 }
 
-void machine_current(const machine_t *m, double i_dq[2])
-{
-    i_dq[0] = m->im_dq[0] - m->iron_A_per_Vs * m->psi_dq[1];
-    i_dq[1] = m->im_dq[1] + m->iron_A_per_Vs * m->psi_dq[0];
-}
-
 void machine_predict(const machine_t *m, const double u_s[2], double h, rotation_t start, rotation_t end,
                      double i_dq[2])
 {
@@ -158,7 +160,7 @@ void machine_predict(const machine_t *m, const double u_s[2], double h, rotation
     to_rotor(end, psi, psi);
     r[0] = psi[0] - m->psi_dq[0];
     r[1] = psi[1] - m->psi_dq[1];
-    flux_divide(m->jac, r, step);
+    flux_solve_step(m->jac, m->per_det, r, step);
     i_dq[0] = m->im_dq[0] + step[0] - m->iron_A_per_Vs * psi[1];
     i_dq[1] = m->im_dq[1] + step[1] + m->iron_A_per_Vs * psi[0];
 }
@@ -172,13 +174,8 @@ void machine_step(machine_t *m, const double u_s[2], const double i_mid_s[2], do
     to_rotor(end, m->psi_s, m->psi_dq);
     r[0] = m->psi_dq[0] - before[0];
     r[1] = m->psi_dq[1] - before[1];
-    flux_divide(m->jac, r, start);
+    flux_solve_step(m->jac, m->per_det, r, start);
     start[0] += m->im_dq[0];
     start[1] += m->im_dq[1];
     find_current(m, start);
-}
-
-double machine_torque(const machine_t *m)
-{
-    return 1.5 * m->pole_pairs * (m->psi_dq[0] * m->im_dq[1] - m->psi_dq[1] * m->im_dq[0]);
 }

@@ -28,6 +28,7 @@ typedef struct {
     double iron_A_per_Vs; /* i_fe = j psi times this (PL-8), (PL-28) */
     double psi_s[2];
     double psi_dq[2], im_dq[2], jac[4]; /* at the present instant; jac at the last iterate of the inversion */
+    double per_det;                     /* 1/det(jac) */
     long failures;
 } machine_t;
 
@@ -39,7 +40,11 @@ void machine_update(machine_t *m, const plant_params_t *p, rotation_t rotor, dou
 void machine_set_current(machine_t *m, const double im_dq[2], rotation_t rotor);
 
 /** Terminal current in the rotor frame at the present instant. */
-void machine_current(const machine_t *m, double i_dq[2]);
+static inline void machine_current(const machine_t *m, double i_dq[2])
+{
+    i_dq[0] = m->im_dq[0] - m->iron_A_per_Vs * m->psi_dq[1];
+    i_dq[1] = m->im_dq[1] + m->iron_A_per_Vs * m->psi_dq[0];
+}
 
 /** Terminal current at the end of a substep with voltage u_s, linearised. */
 void machine_predict(const machine_t *m, const double u_s[2], double h, rotation_t start, rotation_t end,
@@ -48,6 +53,9 @@ void machine_predict(const machine_t *m, const double u_s[2], double h, rotation
 /** One substep of length h; i_mid_s: the terminal current in its middle. */
 void machine_step(machine_t *m, const double u_s[2], const double i_mid_s[2], double h, rotation_t end);
 
-double machine_torque(const machine_t *m);
+static inline double machine_torque(const machine_t *m)
+{
+    return 1.5 * m->pole_pairs * (m->psi_dq[0] * m->im_dq[1] - m->psi_dq[1] * m->im_dq[0]);
+}
 
 #endif

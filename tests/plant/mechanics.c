@@ -7,6 +7,9 @@
 
 double wrap_angle(double angle_rad)
 {
+    if (angle_rad > 0.0 && angle_rad < TWO_PI) {
+        return angle_rad; /* as below, to the bit */
+    }
     const double wrapped = angle_rad - TWO_PI * floor(angle_rad / TWO_PI);
     return wrapped < TWO_PI && wrapped >= 0.0 ? wrapped : 0.0;
 }

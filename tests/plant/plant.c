@@ -17,6 +17,8 @@ struct plant {
     machine_t machine;
     inverter_t inverter;
     mechanics_t mechanics;
+    double theta_e_rad; /* of rotor: three functions of a period need the same angle */
+    rotation_t rotor;
     sensors_t sensors;
     plant_switches_t on;
     double link_V; /* of the capacitor */
@@ -33,10 +35,14 @@ typedef struct {
     double short_circuit_A; /* through both switches of a leg, mean over the period */
 } bridge_t;
 
-static rotation_t rotor_angle(const plant_t *plant)
+static rotation_t rotor_angle(plant_t *plant)
 {
     const double theta_e = plant->params.pole_pairs * plant->mechanics.theta_m_rad;
-    return (rotation_t){cos(theta_e), sin(theta_e)};
+    if (theta_e != plant->theta_e_rad) {
+        plant->theta_e_rad = theta_e;
+        plant->rotor = (rotation_t){cos(theta_e), sin(theta_e)};
+    }
+    return plant->rotor;
 }
 
 static double vdc_at(const plant_params_t *p, double time_s)
@@ -104,6 +110,7 @@ plant_t *plant_create(const plant_params_t *params, const plant_map_t *map)
     plant->params = *params;
     plant->on = (plant_switches_t){.contactor = 1, .gate_supply = 1};
     plant->link_V = params->vdc_start_V;
+    plant->rotor = (rotation_t){1.0, 0.0}; /* at theta_e_rad = 0 */
     machine_create(&plant->machine, params, map);
     sensors_create(&plant->sensors, params);
     plant_set_state(plant, 0.0, 0.0, params->theta_m_rad, params->speed_rad_s);
@@ -146,11 +153,13 @@ void plant_sample(plant_t *plant, plant_sensors_t *sensors)
     sensors->gate_fault = plant->gate_fault || plant->params.drivers_block;
 }
 
-static void substep(plant_t *plant, rotation_t *rotor, double vdc_V, double short_circuit_A, double h, energy_t *sum)
+/* now: the instant at its start, then at its end, where the next one starts. */
+static void substep(plant_t *plant, rotation_t *rotor, instant_t *now, double vdc_V, double short_circuit_A, double h,
+                    energy_t *sum)
 {
     const plant_params_t *p = &plant->params;
     machine_t *m = &plant->machine;
-    const instant_t from = energy_instant(m);
+    const instant_t from = *now;
     const double mid_rad_s = mechanics_mid_speed(&plant->mechanics, p, from.torque_Nm, h);
     const double half_rad = 0.5 * h * p->pole_pairs * mid_rad_s;
     const rotation_t half = rotation_of(half_rad), mid = rotation_add(*rotor, half), end = rotation_add(mid, half);
@@ -164,11 +173,11 @@ static void substep(plant_t *plant, rotation_t *rotor, double vdc_V, double shor
     to_phases(i_s, i_abc);
     machine_step(m, u_s, i_s, h, end);
 
-    const instant_t to = energy_instant(m);
-    const double torque_Nm = 0.5 * (from.torque_Nm + to.torque_Nm);
+    *now = energy_instant(m);
+    const double torque_Nm = 0.5 * (from.torque_Nm + now->torque_Nm);
     mechanics_step(&plant->mechanics, p, mid_rad_s, torque_Nm, h);
     energy_voltage(sum, u_s, mid, half_rad, h);
-    energy_electric(sum, m, &from, &to, u_s, i_s, h);
+    energy_electric(sum, m, &from, now, u_s, i_s, h);
     energy_mechanic(sum, torque_Nm, mid_rad_s, mechanics_friction(p, mid_rad_s), h);
     const double charge_As = h * (inverter_dc_current(&plant->inverter, i_abc) + short_circuit_A);
     sum->dc += vdc_V * charge_As;
@@ -258,12 +267,13 @@ void plant_advance(plant_t *plant, const double wanted[3], int gates_on)
     double vdc_V = bridge_V(plant, middle_s);
     energy_t sum = {0};
     rotation_t rotor = update(plant);
+    instant_t now = energy_instant(&plant->machine);
     series_source(plant, rotor);
     inverter_set(&plant->inverter, p, duty, bridge.switching, vdc_V);
     hardware_apply(plant, &bridge);
     for (int k = 0; k < n; k++) {
         const double before_As = sum.charge;
-        substep(plant, &rotor, vdc_V, bridge.short_circuit_A, period_s / n, &sum);
+        substep(plant, &rotor, &now, vdc_V, bridge.short_circuit_A, period_s / n, &sum);
         vdc_V = link_substep(plant, &bridge, vdc_V, sum.charge - before_As, period_s / n);
         hardware_apply(plant, &bridge);
     }

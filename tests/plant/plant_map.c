@@ -141,11 +141,20 @@ static int axis_copy(map_axis_t *axis, const double *x, int n)
     axis->last = x[n - 1];
     axis->per_step = (n - 1) / (x[n - 1] - x[0]);
     axis->node = calloc((size_t)axis->n, sizeof *axis->node);
-    if (axis->node == NULL) {
+    axis->per_h = calloc((size_t)axis->n, sizeof *axis->per_h);
+    if (axis->node == NULL || axis->per_h == NULL) {
         return 0;
     }
     memcpy(&axis->node[MAP_BEYOND], x, (size_t)n * sizeof *x);
     return 1;
+}
+
+/* Once every node is known. */
+static void axis_cells(map_axis_t *axis)
+{
+    for (int k = 0; k + 1 < axis->n; k++) {
+        axis->per_h[k] = 1.0 / (axis->node[k + 1] - axis->node[k]);
+    }
 }
 
 /* Cells and nodes; 0 if an allocation fails. */
@@ -171,6 +180,8 @@ static int fill(plant_map_t *map, map_nodes_t *nodes, const double *psi_d_Vs, co
     if (!(least.d > 0.0 && least.q > 0.0 && least.det > 1e-6) || !plant_map_extrapolate(map, nodes, least)) {
         return 0;
     }
+    axis_cells(&map->d);
+    axis_cells(&map->q);
     fill_zero(map);
     return 1;
 }
@@ -200,6 +211,8 @@ void plant_map_destroy(plant_map_t *map)
     if (map != NULL) {
         free(map->d.node);
         free(map->q.node);
+        free(map->d.per_h);
+        free(map->q.per_h);
         free(map->cell);
         free(map->zero);
         free(map);

@@ -26,6 +26,9 @@ void plant_map_flux(const plant_map_t *map, double id_A, double iq_A, double *ps
 /** psi_d(0, i_q) and its slope; needs less computation than plant_map_flux(). */
 double plant_map_axis_flux(const plant_map_t *map, double iq_A, double *slope_H);
 
+/** Both at i = {i_d, i_q}: psi and jac as of plant_map_flux(), psi_d(0, i_q) with its slope returned. */
+double plant_map_both(const plant_map_t *map, const double i[2], double psi[2], double jac[4], double *slope_H);
+
 /** Newton's method with step halving, from the given currents (any start) to 1e-10 Vs. Returns 0, or -1 on failure. */
 int plant_map_invert(const plant_map_t *map, double psi_d_Vs, double psi_q_Vs, double *id_A, double *iq_A);
 

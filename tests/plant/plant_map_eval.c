@@ -21,7 +21,7 @@ static inline grid_position_t locate(const map_axis_t *axis, double x)
     while (k < top && x >= node[k + 1]) {
         k++;
     }
-    double per_h = 1.0 / (node[k + 1] - node[k]);
+    double per_h = axis->per_h[k];
     double t = (x - node[k]) * per_h;
     double limited = t < 0.0 ? 0.0 : (t > 1.0 ? 1.0 : t);
     return (grid_position_t){.k = k, .t = limited, .beyond = t - limited, .per_h = per_h};
@@ -64,13 +64,24 @@ void plant_map_cell_flux(const plant_map_t *map, int i, int j, double t, double 
                   (grid_position_t){.k = j, .t = u, .per_h = 1.0 / (q[1] - q[0])}, psi, jac);
 }
 
-double plant_map_axis_flux(const plant_map_t *map, double iq_A, double *slope_H)
+static inline double evaluate_axis(const plant_map_t *map, grid_position_t q, double *slope_H)
 {
-    const grid_position_t q = locate(&map->q, iq_A);
     const double *c = map->zero[q.k], u = q.t;
     double slope = c[1] + u * (2.0 * c[2] + u * 3.0 * c[3]);
     *slope_H = slope * q.per_h;
     return c[0] + u * (c[1] + u * (c[2] + u * c[3])) + q.beyond * slope;
+}
+
+double plant_map_axis_flux(const plant_map_t *map, double iq_A, double *slope_H)
+{
+    return evaluate_axis(map, locate(&map->q, iq_A), slope_H);
+}
+
+double plant_map_both(const plant_map_t *map, const double i[2], double psi[2], double jac[4], double *slope_H)
+{
+    const grid_position_t q = locate(&map->q, i[1]);
+    evaluate_cell(map, locate(&map->d, i[0]), q, psi, jac);
+    return evaluate_axis(map, q, slope_H);
 }
 
 static void map_flux(const void *map, const double i[2], double psi[2], double jac[4])

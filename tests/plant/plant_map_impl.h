@@ -15,7 +15,8 @@ typedef struct {
 } map_cell_t;
 
 typedef struct {
-    double *node; /* n strictly increasing currents: MAP_BEYOND added, the given ones, MAP_BEYOND added */
+    double *node;  /* n strictly increasing currents: MAP_BEYOND added, the given ones, MAP_BEYOND added */
+    double *per_h; /* of each of the n - 1 cells: 1 over its width */
     int n;
     double first, last, per_step; /* of the given nodes; per_step: (count - 1)/span, for the first guess of a cell */
 } map_axis_t;

@@ -25,6 +25,11 @@ if(WIN32)
     target_compile_definitions(fluxtrue_hal_host PRIVATE FLUXTRUE_BUILD) # its functions are exported
 else()
     fluxtrue_part(fluxtrue_plant STATIC tests/plant "${tests}" "${tests}/plant")
+    if(TARGET fluxtrue_plant)
+        # Two numbers are stored one by one and loaded as a pair at once, for which the processor waits: the results are
+        # the same to the bit, a substep takes 4 % less.
+        target_compile_options(fluxtrue_plant PRIVATE -fno-tree-slp-vectorize)
+    endif()
     fluxtrue_part(fluxtrue_twin STATIC tests/support/twin "${tests}" "${tests}/support" "${firmware}")
     fluxtrue_part(fluxtrue_sim_runner OBJECT tests/loop/runner
         "${tests}" "${tests}/support" "${firmware}" "${CMAKE_SOURCE_DIR}")
