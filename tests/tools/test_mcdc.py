@@ -211,6 +211,18 @@ def test_an_exclusion_without_a_reason_or_in_another_form_is_refused(tmp_path: P
     assert complaints[0].startswith("firmware/safety/a.c:1: ")
 
 
+def test_a_file_that_no_part_has_is_named_once(both: Path, run: Run) -> None:
+    """An exclusion or a decision in a new folder, for which PARTS does not say what must be shown."""
+    (both / "firmware/safety/both.c").unlink()
+    write(both, "firmware/new/both.c", *BOTH[:3], f"{BOTH[3]} /* MCDC_EXCL C2: {REASON} */", BOTH[4])
+    write(both, "docs/safety/mcdc.md", "| safety | 0 | 0 |")
+    complaint = "firmware/new/both.c:1: no part has this file: name its folder in PARTS of tools/checks/mcdc.py"
+    assert check(both)[::2] == (1, [complaint])
+    (both / "docs/safety/mcdc.md").unlink()
+    build = run(both, "both(1, 1); both(0, 1);", sources=("firmware/new/both.c",))
+    assert check(both, "--build", build)[::2] == (1, [complaint])
+
+
 def test_a_count_of_the_page_that_was_not_measured_is_found(both: Path, run: Run) -> None:
     build = run(both, "both(1, 1); both(0, 1); both(1, 0);")
     page = "\n".join(page_rows({name: [0, 0, 0] for name, _, _ in PARTS} | {"safety": [2, 2, 0]}, 1))

@@ -176,6 +176,12 @@ def part_of(path: Path) -> str:
     return next((name for name, pattern, _ in PARTS if re.match(pattern, path.as_posix())), "")
 
 
+def without_part(found: Iterable[Decision | Exclusion]) -> Iterator[Violation]:
+    """Each file that has decisions or exclusions, and for which no part says what must be shown."""
+    for path in sorted({one.path for one in found if not part_of(one.path)}):
+        yield Violation(path, 1, "no part has this file: name its folder in PARTS of tools/checks/mcdc.py")
+
+
 def all_exclusions(root: Path) -> list[Exclusion | Violation]:
     """Every exclusion below firmware/, and every marker that does not have the form of one."""
     found: list[Exclusion | Violation] = []
@@ -287,9 +293,9 @@ def excluded_rows(root: Path, excluded: Iterable[Exclusion]) -> Iterator[Violati
             yield Violation(PAGE, number, f"{match[1]}: {match[2]} excluded, the sources exclude {found[match[1]]}")
 
 
-def evaluate(root: Path, build: Path, excluded: list[Exclusion], part: str) -> Iterator[Violation]:
+def evaluate(root: Path, found: list[Decision], excluded: list[Exclusion], part: str) -> Iterator[Violation]:
     """Print the table; yield what is missing."""
-    decisions = measured(root, build)
+    decisions = [one for one in found if part_of(one.path)]
     figures, missing = evaluated(root, decisions, excluded)
     print(f"{'part':14} shown of conditions  percent  wanted  excluded")
     for name, _, wanted in PARTS:
@@ -302,7 +308,7 @@ def evaluate(root: Path, build: Path, excluded: list[Exclusion], part: str) -> I
           f", {len(decisions)} decisions")  # fmt: skip
     if not part:
         yield from outdated(root, page_rows(figures, len(decisions)))
-        yield from unmeasured(root, decisions, excluded)
+        yield from unmeasured(root, found, excluded)
         yield from stale(decisions, excluded)
 
 
@@ -315,9 +321,12 @@ def main() -> int:
                         help="all conditions that are not shown, of one part or of all")  # fmt: skip
     args = parser.parse_args()
     exclusions, violations = listed(all_exclusions(args.root), "MC/DC")
+    decisions = measured(args.root.resolve(), args.build.resolve()) if args.build else []
+    violations += without_part([*exclusions, *decisions])
+    exclusions = [one for one in exclusions if part_of(one.path)]
     violations += excluded_rows(args.root, exclusions)
     if args.build:
-        violations += evaluate(args.root.resolve(), args.build.resolve(), exclusions, args.part)
+        violations += evaluate(args.root.resolve(), decisions, exclusions, args.part)
     return report(violations, "mcdc")
 
 
