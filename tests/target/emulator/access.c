@@ -130,8 +130,7 @@ bool emu_write(emu_t *emu, uint32_t address, const void *from, uint32_t size)
         memcpy(cells, from, size);
         return true;
     }
-    emu_code_changed(emu, address, size);
-    return uc_mem_write(emu->uc, address, from, size) == UC_ERR_OK;
+    return emu_memory_write(emu, address, from, size);
 }
 
 uint32_t emu_symbol(const emu_t *emu, const char *name)
@@ -268,8 +267,7 @@ static void ram_restore(emu_t *emu, const uint8_t *ram)
     for (uint32_t at = 0; at < RAM_SIZE; at += RAM_PIECE) {
         (void)uc_mem_read(emu->uc, RAM_BASE + at, now, RAM_PIECE);
         if (memcmp(now, ram + at, RAM_PIECE) != 0) {
-            (void)uc_mem_write(emu->uc, RAM_BASE + at, ram + at, RAM_PIECE);
-            emu_code_changed(emu, RAM_BASE + at, RAM_PIECE);
+            (void)emu_memory_write(emu, RAM_BASE + at, ram + at, RAM_PIECE);
         }
     }
 }

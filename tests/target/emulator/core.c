@@ -197,13 +197,31 @@ static inline block_t block_at(emu_t *emu, uint32_t address, uint32_t size)
     return *known;
 }
 
-void emu_code_changed(emu_t *emu, uint32_t address, uint32_t size)
+/* Unicorn discards pages that follow each other in one of its memories; the RAM is two of them. */
+static bool translated_discard(emu_t *emu, uint32_t address, uint32_t size)
 {
+    const uint32_t end = address + size;
+    const uint32_t first_end = address < RAM_UPPER && end > RAM_UPPER ? RAM_UPPER : end;
+    // NOLINTBEGIN(clang-analyzer-optin.core.EnumCastOutOfRange): Unicorn's flags are made to be combined
+    return uc_ctl_remove_cache(emu->uc, address, first_end) == UC_ERR_OK &&
+           (first_end == end || uc_ctl_remove_cache(emu->uc, first_end, end) == UC_ERR_OK);
+    // NOLINTEND(clang-analyzer-optin.core.EnumCastOutOfRange)
+}
+
+bool emu_memory_write(emu_t *emu, uint32_t address, const void *from, uint32_t size)
+{
+    if (uc_mem_write(emu->uc, address, from, size) != UC_ERR_OK) {
+        return false;
+    }
     for (uint32_t at = address & ~1U; at < address + size; at += 2U) {
         if (code_place(at) < CODE_SIZE / 2) {
             emu->block[code_place(at)].size = 0;
         }
     }
+    if (!translated_discard(emu, address, size)) {
+        emu_fail(emu, "translated code at 0x%08x cannot be discarded", address);
+    }
+    return true;
 }
 
 static bool must_stop(const state_t *s)
@@ -389,7 +407,7 @@ static void ram_lose(emu_t *emu, uint32_t from, uint32_t end)
     uint8_t lost[256];
     memset(lost, 0xA5, sizeof lost);
     for (uint32_t at = from; at < end; at += sizeof lost) {
-        (void)uc_mem_write(emu->uc, at, lost, sizeof lost);
+        (void)emu_memory_write(emu, at, lost, sizeof lost);
     }
 }
 
@@ -438,7 +456,6 @@ void emu_reset(emu_t *emu, uint32_t cause)
     (void)uc_reg_write(emu->uc, UC_ARM_REG_BASEPRI, &zero);
     (void)uc_reg_write(emu->uc, UC_ARM_REG_SP, &vector[0]);
     s->pc = vector[1] & ~1U;
-    emu_code_changed(emu, RAM_BASE, RAM_SIZE);
     emu_upper_ram_update(emu);
 }
 
@@ -503,7 +520,7 @@ static const char *program_load(emu_t *emu)
         if (segment.address >= FLASH_SIZE || segment.file_size > FLASH_SIZE - segment.address) {
             return "has a part that does not lie in the flash";
         }
-        if (uc_mem_write(emu->uc, segment.address, segment.content, segment.file_size) != UC_ERR_OK) {
+        if (!emu_memory_write(emu, segment.address, segment.content, segment.file_size)) {
             return "does not fit the flash";
         }
     }
@@ -526,7 +543,7 @@ emu_t *emu_create(const char *elf, int mode, char *error, size_t size)
             uint8_t erased[4096];
             memset(erased, 0xFF, sizeof erased);
             for (uint32_t at = 0; at < FLASH_SIZE; at += sizeof erased) {
-                (void)uc_mem_write(emu->uc, at, erased, sizeof erased);
+                (void)emu_memory_write(emu, at, erased, sizeof erased);
             }
             bad = program_load(emu);
         }

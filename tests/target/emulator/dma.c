@@ -203,24 +203,15 @@ static void begin(emu_t *emu, uint32_t channel)
     }
 }
 
-/* One half word after the other, as the controller does: a copy may overlap its source. What unicorn has translated of
- * the destination is discarded here, because it stays in use when memory is written from outside. */
+/* One half word after the other, as the controller does: a copy may overlap its source. */
 static void copy(emu_t *emu, copy_t c)
 {
-    const uint32_t other = c.destination + (c.count - 1U) * (uint32_t)c.destination_step;
-    const uint32_t first = c.destination < other ? c.destination : other;
-    const uint32_t size = c.destination + other - 2U * first + HALF_WORD;
     for (uint32_t k = 0; k < c.count; k++) {
         uint8_t half_word[HALF_WORD];
         (void)uc_mem_read(emu->uc, c.source, half_word, sizeof half_word);
-        (void)uc_mem_write(emu->uc, c.destination, half_word, sizeof half_word);
+        (void)emu_memory_write(emu, c.destination, half_word, sizeof half_word);
         c.source += (uint32_t)c.source_step;
         c.destination += (uint32_t)c.destination_step;
-    }
-    emu_code_changed(emu, first, size);
-    // NOLINTNEXTLINE(clang-analyzer-optin.core.EnumCastOutOfRange): Unicorn's flags are made to be combined
-    if (uc_ctl_remove_cache(emu->uc, first, first + size) != UC_ERR_OK) {
-        emu_fail(emu, "DMA: translated code cannot be discarded");
     }
 }
 

@@ -279,8 +279,10 @@ static inline uint32_t code_place(uint32_t address)
 }
 
 /* core.c */
-/** Something other than the program has written this: what was known of code there is discarded. */
-void emu_code_changed(emu_t *emu, uint32_t address, uint32_t size);
+/** The only way to write the flash and the RAM from outside the program, also in its place (DMA, exception frames): what
+ * is known of code there, and what unicorn has translated of it, is discarded. Unicorn would continue to use the latter.
+ * false: there is no memory. */
+bool emu_memory_write(emu_t *emu, uint32_t address, const void *from, uint32_t size);
 void emu_fail(emu_t *emu, const char *format, ...) __attribute__((format(printf, 2, 3)));
 uint32_t emu_pc(const emu_t *emu);
 void emu_timer(emu_t *emu, timer_t_ timer, uint64_t due);

@@ -171,7 +171,7 @@ static uint32_t words_of(uint32_t exc_return)
 
 static bool stack_write(emu_t *emu, uint32_t address, const uint32_t *words, uint32_t count)
 {
-    if (uc_mem_write(emu->uc, address, words, (size_t)4U * count) == UC_ERR_OK) {
+    if (emu_memory_write(emu, address, words, 4U * count)) {
         return true;
     }
     emu_fail(emu, "the stack is outside the memory: exception frame at 0x%08x", address);

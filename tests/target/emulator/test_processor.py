@@ -4,6 +4,7 @@
 import ctypes
 import struct
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -233,6 +234,51 @@ def test_a_snapshot_restores_everything(library: ctypes.CDLL, exceptions: Path) 
         assert (core.word("ticks"), core.now_s, core.instructions) == seen
         core.run(3e-3)
         assert core.word("ticks") == seen[0] + 3
+
+
+NARROW = struct.pack("<4H", 0x2001, 0xBF00, 0xBF00, 0x4770)  # movs r0, #1; two instructions without effect; bx lr
+WIDE = struct.pack("<4H", 0x2002, 0xF3AF, 0x8000, 0x4770)  # movs r0, #2; a wide one; bx lr: one instruction less
+
+
+@pytest.fixture
+def patched(library: ctypes.CDLL, program: Program) -> Iterator[Core]:
+    """A program that has called the narrow function in RAM, which is therefore translated."""
+    with Core.of_program(library, program("patched")) as core:
+        core.run(1e-4)
+        core.write(core.symbol("is_written"), bytes(4))
+        core.run(1e-4)
+        core.write(core.symbol("in_ram"), NARROW)
+        core.write(core.symbol("is_written"), b"\1")
+        core.run(1e-4)
+        assert [core.word("answer", k) for k in range(2)] == [1, 1]
+        yield core
+
+
+def test_code_that_a_debugger_writes_runs(patched: Core) -> None:
+    cycles = patched.word("cycles")
+    patched.write(patched.symbol("in_ram"), WIDE)
+    patched.write(patched.symbol("in_flash") & ~1, WIDE[:2])
+    patched.run(1e-4)
+    assert [patched.word("answer", k) for k in range(2)] == [2, 2]
+    assert cycles - patched.word("cycles") in (1, 2)  # an instruction takes 1.5 cycles
+
+
+def test_code_that_a_snapshot_restores_runs(patched: Core) -> None:
+    cycles, snapshot = patched.word("cycles"), patched.save()
+    patched.write(patched.symbol("in_ram"), WIDE)
+    patched.run(1e-4)
+    assert patched.word("answer", 1) == 2
+    patched.restore(snapshot)
+    patched.free(snapshot)
+    patched.run(1e-4)
+    assert (patched.word("answer", 1), patched.word("cycles")) == (1, cycles)
+
+
+def test_code_that_a_reset_loses_does_not_run(patched: Core) -> None:
+    """The RAM's content is lost: after the start the program finds its flag set, and no function."""
+    patched.reset(WATCHDOG)
+    patched.run(1e-4)
+    assert [patched.word("answer", k) for k in range(2)] == [1, 0xA5A5A5A5]  # nothing has returned from there
 
 
 def test_a_file_that_is_no_program_is_refused_by_name(library: ctypes.CDLL, tmp_path: Path) -> None:
