@@ -7,7 +7,6 @@
 #include "hal/angle.h"
 #include "hal/board.h"
 #include "hal/can.h"
-#include "hal/gather.h"
 #include "hal/host/can_host.h"
 #include "hal/irq.h"
 #include "hal/nvm.h"
@@ -145,38 +144,6 @@ int16_t hal_temperature_inverter_dC(void)
 int16_t hal_temperature_processor_dC(void)
 {
     return TEMPERATURE_UNKNOWN; /* a PC has no such sensor */
-}
-
-/* A PC copies by its processor. */
-bool hal_gather_is_idle(void)
-{
-    return false;
-}
-
-void hal_gather_set_up(uint32_t columns, const uint32_t *stride, uint32_t row_size)
-{
-    (void)columns;
-    (void)stride;
-    (void)row_size;
-}
-
-// NOLINTNEXTLINE(readability-non-const-parameter): a port with hardware writes there
-void hal_gather_move(uint32_t column, const void *from, int16_t *to)
-{
-    (void)column;
-    (void)from;
-    (void)to;
-}
-
-void hal_gather_add(uint32_t count, bool is_further)
-{
-    (void)count;
-    (void)is_further;
-}
-
-void hal_gather_start(uint32_t parts)
-{
-    (void)parts;
 }
 
 void hal_watchdog_start(void)

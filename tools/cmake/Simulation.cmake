@@ -19,8 +19,14 @@ endfunction()
 set(tests "${CMAKE_SOURCE_DIR}/tests")
 set(firmware "${CMAKE_SOURCE_DIR}/firmware")
 
+# The firmware's port on a computer. A computer copies by its processor, as a port without a DMA does.
+file(GLOB FLUXTRUE_HOST_PORT CONFIGURE_DEPENDS "${CMAKE_SOURCE_DIR}/hal/host/*.c")
+set(FLUXTRUE_NO_GATHER "${CMAKE_SOURCE_DIR}/hal/template/gather.c")
+list(APPEND FLUXTRUE_HOST_PORT "${FLUXTRUE_NO_GATHER}")
+
 # Object libraries where the exported functions must be kept although nothing calls them.
 fluxtrue_part(fluxtrue_hal_host OBJECT hal/host "${firmware}" "${CMAKE_SOURCE_DIR}")
+target_sources(fluxtrue_hal_host PRIVATE "${FLUXTRUE_NO_GATHER}")
 if(WIN32)
     target_compile_definitions(fluxtrue_hal_host PRIVATE FLUXTRUE_BUILD) # its functions are exported
 else()

@@ -34,6 +34,11 @@ def test_the_template_defines_what_the_header_declares(header: Path) -> None:
     assert "/* Write" in source.read_text(encoding="utf-8")
 
 
+def test_the_library_for_a_computer_takes_the_functions_of_a_port_without_a_dma_from_the_template() -> None:
+    ports = {path.parent.name for path in HAL.glob("*/*.c") if "hal_gather_is_idle" in functions(path, "{")}
+    assert ports == {"template", "s32k144"}
+
+
 def test_the_howto_lists_every_header() -> None:
     page = (HAL.parent / "docs" / "howto" / "port.md").read_text(encoding="utf-8")
     assert [header.name for header in HEADERS if f"`hal/{header.name}`" not in page] == []
