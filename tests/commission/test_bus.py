@@ -91,6 +91,15 @@ def test_lost_commands_end_the_pulses_in_the_safe_state(stand: Stand, known: Nam
     assert stand.drive.get("run_state") == 0.0 and stand.current_A() < 1.0
 
 
+def test_a_capture_with_lost_samples_ends_the_step(stand: Stand, known: Nameplate) -> None:
+    """The counter is set in what the tool reads: the virtual ECU loses none."""
+    scope = stand.drive._scope
+    header = scope._header
+    scope._header = lambda: header() | {"lost": 1}  # type: ignore[method-assign]
+    with pytest.raises(FluxtrueError, match="commission: the inverter lost samples once"):
+        run(stand.drive, chosen(("resistance",)), known, lambda _: None)
+
+
 def test_a_closed_connection_is_one_message(stand: Stand, known: Nameplate) -> None:
     during(stand.drive, lambda: (stand.ecu.stop(), None)[1])
     with pytest.raises(FluxtrueError, match="the connection to the inverter is closed"):

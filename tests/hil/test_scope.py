@@ -219,6 +219,24 @@ def test_a_block_that_was_damaged_on_the_way_is_read_again(
     scope.stop()
 
 
+@pytest.mark.program
+def test_the_command_warns_once_of_samples_that_the_inverter_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The counter is set in what the tool reads: the virtual ECU loses none."""
+    log, header = tmp_path / "a.mf4", Scope._header
+    warning = "the inverter lost samples 2 times"
+    code, said = run("--signal", "i_d_A", "--samples", "60", "--mdf", str(log))
+    assert code == 0 and warning not in said
+    with MDF(log) as mdf:
+        assert warning not in mdf.groups[0].channel_group.comment
+    monkeypatch.setattr(Scope, "_header", lambda scope: header(scope) | {"lost": 2})
+    code, said = run("--signal", "i_d_A", "--samples", "60", "--mdf", str(log))
+    assert code == 0 and said.count(warning) == 1
+    with MDF(log) as mdf:
+        assert warning in mdf.groups[0].channel_group.comment
+
+
 @pytest.mark.plant
 def test_a_capture_changes_no_duty(rig: Rig, description: Description) -> None:
     def drive(capture: bool) -> str:

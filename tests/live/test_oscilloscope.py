@@ -70,6 +70,12 @@ def test_a_capture_of_a_few_samples_has_no_spectrum() -> None:
         spectrum_of(few)
 
 
+@pytest.mark.parametrize(("lost", "times"), [(1, "lost samples once:"), (3, "lost samples 3 times:")])
+def test_a_capture_with_lost_samples_has_a_warning(lost: int, times: str) -> None:
+    assert content(captured())["warning"] == ""
+    assert times in content(replace(captured(), lost=lost))["warning"]
+
+
 class Transport:
     """A connection on which nothing answers."""
 

@@ -327,8 +327,15 @@ class OverTheBus:
             action(periods * self.period_s)
             self._scope.until_complete(2.0 * periods * self.period_s + 1.0)
             self._check()
-            columns = self._scope.read().columns
+            columns = self._captured()
         return np.column_stack([self._column(columns, name) for name in names])
+
+    def _captured(self, most: int | None = None) -> Mapping[str, Array]:
+        """The capture's columns; what the machine is identified from must be complete."""
+        capture = self._scope.read(most=most)
+        if capture.warning:
+            raise FluxtrueError(f"commission: {capture.warning}")
+        return capture.columns
 
     @staticmethod
     def _column(columns: Mapping[str, Array], name: str) -> Array:
@@ -389,7 +396,7 @@ class OverTheBus:
             self.rest(TOLD_S)
         with self._fault_first():
             self._scope.until_complete(periods * self.period_s + 1.0)
-            columns = self._scope.read(most=most).columns
+            columns = self._captured(most)
         rows = np.column_stack([self._column(columns, name) for name in PULSE_SIGNALS])
         acts = pulsing(rows[:, 2], rows[:, 3], values["pulses_vd"], values["pulses_vq"])
         if acts[-1] and phase == DONE:

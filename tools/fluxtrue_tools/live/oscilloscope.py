@@ -63,7 +63,7 @@ def content(capture: Capture) -> dict[str, Any]:
     """A capture and its spectrum as the pages draw them."""
     step_s = float(capture.time_s[1] - capture.time_s[0]) if len(capture.time_s) > 1 else 0.0
     answer = {"trigger": capture.trigger, "step_s": step_s, "is_freeze_frame": capture.is_freeze_frame,
-              "units": capture.units, "spectrum": None,
+              "units": capture.units, "spectrum": None, "warning": capture.warning,
               "columns": {name: _rounded(column) for name, column in capture.columns.items()}}  # fmt: skip
     if len(capture.time_s) >= SAMPLES_MIN:
         spectrum = spectrum_of(capture)

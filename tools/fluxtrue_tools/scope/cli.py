@@ -57,6 +57,8 @@ def _tell(capture: Capture) -> None:
     what = "freeze frame around a fault" if capture.is_freeze_frame else "capture"
     click.echo(f"{what} {capture.number}: {len(capture.time_s)} samples, {capture.trigger} before the trigger in "
                f"period {capture.trigger_period}")  # fmt: skip
+    if capture.warning:
+        click.echo(f"warning: {capture.warning}", err=True)
     width = max(len(name) for name in capture.columns)
     for name, column in capture.columns.items():
         click.echo(f"{name:<{width}}  {column.min():>11.5g}  {column.max():>11.5g}  {capture.units[name]}")

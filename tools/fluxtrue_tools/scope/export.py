@@ -27,7 +27,8 @@ def write_mdf(capture: Capture, path: Path) -> None:
     channels = [Signal(samples=column, timestamps=times, name=name, unit=capture.units[name],
                        comment=capture.texts[name]) for name, column in capture.columns.items()]  # fmt: skip
     with MDF(version="4.10") as mdf:
-        mdf.append(channels, comment=f"trigger at {times[capture.trigger]:.6f} s")
+        warning = f"; {capture.warning}" if capture.warning else ""
+        mdf.append(channels, comment=f"trigger at {times[capture.trigger]:.6f} s{warning}")
         mdf.save(path, overwrite=True, compression=2)
 
 

@@ -60,6 +60,16 @@ class Capture:
     trigger_period: int  # PWM periods since the start of the drive
     is_freeze_frame: bool
     number: int
+    lost: int = 0  # how often the inverter came too late for samples, or a copy of them did not end in time
+
+    @property
+    def warning(self) -> str:
+        """Why the samples must not be trusted; empty if they may be."""
+        if not self.lost:
+            return ""
+        times = "once" if self.lost == 1 else f"{self.lost} times"
+        return (f"the inverter lost samples {times}: its 1 kHz task was late, or a copy did not end in time; values "
+                "may be wrong or missing, repeat the capture")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -236,7 +246,7 @@ class Scope:
             index * status.divisor * self._period_s,
             {signal.name: array * signal.base.factor for signal, array in zip(chosen, arrays, strict=True)},
             {signal.name: signal.base.unit for signal in chosen}, {signal.name: signal.text for signal in chosen},
-            status.before, status.trigger_period, status.is_freeze_frame, status.number,
+            status.before, status.trigger_period, status.is_freeze_frame, status.number, status.lost,
         )  # fmt: skip
 
     def _user(self, *command: int) -> None:

@@ -205,6 +205,7 @@ export function showCapture(known) {
   $("scope-spectrum").ariaPressed = String(isSpectrum);
   show("scope-pause", isPaused ? "Continue" : "Pause");
   show("scope-spectrum", isSpectrum ? "Samples" : "Spectrum");
-  const text = drawn ? `${capture.is_freeze_frame ? "Freeze frame" : "Capture"} ${capture.number}` : "";
-  show("scope-told", drawn && isPaused && capture.number !== newest ? `${text}, paused; there is a newer one` : text);
+  const name = drawn ? `${capture.is_freeze_frame ? "Freeze frame" : "Capture"} ${capture.number}` : "";
+  const text = drawn && isPaused && capture.number !== newest ? `${name}, paused; there is a newer one` : name;
+  show("scope-told", drawn && capture.warning ? `${text}: ${capture.warning}` : text);
 }
