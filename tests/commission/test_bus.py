@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from bus_stand import COMMAND_ID, COMMISSION_ID, Stand, bus_stand
 
+from fluxtrue_tools.a2l.elf import read
 from fluxtrue_tools.bus.interface import COMMAND, read_interface
 from fluxtrue_tools.cli import run as command
 from fluxtrue_tools.commission import on_the_bus
@@ -89,6 +90,15 @@ def test_lost_commands_end_the_pulses_in_the_safe_state(stand: Stand, known: Nam
         record(stand.drive, LONG, known)
     stand.line.pass_time(OFF_S)
     assert stand.drive.get("run_state") == 0.0 and stand.current_A() < 1.0
+
+
+def test_a_firmware_without_the_commands_for_pulses_is_refused(
+    stand: Stand, known: Nameplate, unknown: Motor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As one of an earlier version."""
+    monkeypatch.setattr("fluxtrue_tools.commission.bus.PULSE_STATE", 0x7F)
+    with pytest.raises(FluxtrueError, match="this firmware has no commands for voltage pulses"):
+        OverTheBus(stand.line, read(unknown.folder.vecu), known, unknown.plant["vdc_V"])
 
 
 def test_a_capture_with_lost_samples_ends_the_step(stand: Stand, known: Nameplate) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fluxtrue_tools.commission import bus_turning, harmonics, hidden, report, spin, turning
-from fluxtrue_tools.commission.bus import UNKNOWN, OverTheBus
+from fluxtrue_tools.commission.bus import ANGLE_CORRECTION, UNKNOWN, OverTheBus
 from fluxtrue_tools.commission.harmonics import Coasting, Harmonics
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import harmonics_deg, waves_rad
@@ -156,7 +156,8 @@ def test_a_firmware_that_does_not_tell_its_correction_leaves_the_harmonics_open(
 
     drive = OverTheBus.__new__(OverTheBus)
     drive._master = SimpleNamespace(command=refuse)  # type: ignore[assignment]
-    assert drive.angle_correction() == []
+    drive.tells_angle_correction = drive._has_command(ANGLE_CORRECTION)
+    assert not drive.tells_angle_correction
     connection = turning.Connection(4, False, 0.0)
     assert bus_turning._sensor(drive, known, 100.0, connection) is None
     wired = spin.Spun(connection, 0.1, 1e-4, 1e-4, 0.0, 500.0)

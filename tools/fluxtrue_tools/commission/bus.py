@@ -114,7 +114,9 @@ class OverTheBus:
         self._master = XcpMaster(line)
         unlock(self._master)
         self._scope = Scope(self._master, description)
-        self._state()
+        if not self._has_command(PULSE_STATE):
+            raise FluxtrueError("commission: this firmware has no commands for voltage pulses")
+        self.tells_angle_correction = self._has_command(ANGLE_CORRECTION)
 
     @property
     def line(self) -> Line:
@@ -129,6 +131,16 @@ class OverTheBus:
     @passed.setter
     def passed(self, passed: Callable[[float], None]) -> None:
         self._line.passed = passed
+
+    def _has_command(self, query: int) -> bool:
+        """The firmware answers this query; an earlier version does not know it."""
+        try:
+            self._master.command(USER, query)
+        except XcpRefused as error:
+            if error.code != UNKNOWN:
+                raise
+            return False
+        return True
 
     def _torque_Nm(self, i_q_A: float) -> float:
         """The torque of a current by the nameplate."""
@@ -252,13 +264,8 @@ class OverTheBus:
 
     def angle_correction(self) -> list[complex]:
         """What the firmware adds to the sensor's angle, once and twice per turn: Re(value exp(j k theta)), mechanical,
-        rad. Empty if the firmware has no such command."""
-        try:
-            got = [self._master.command(USER, ANGLE_CORRECTION + n) for n in range(4)]
-        except XcpRefused as error:
-            if error.code != UNKNOWN:
-                raise
-            return []
+        rad. Only of a firmware that tells it."""
+        got = [self._master.command(USER, ANGLE_CORRECTION + n) for n in range(4)]
         cosine_1, sine_1, cosine_2, sine_2 = (struct.unpack("<i", bytes(each[:4]))[0] for each in got)
         return [2.0 * math.pi / 2**32 * complex(c, -s) for c, s in ((cosine_1, sine_1), (cosine_2, sine_2))]
 
@@ -366,12 +373,7 @@ class OverTheBus:
 
     def _state(self) -> float:
         """Phase of the pulses."""
-        try:
-            phase, self._failure, *_ = map(float, self._master.command(USER, PULSE_STATE))
-        except XcpRefused as error:
-            if error.code == UNKNOWN:
-                raise FluxtrueError("commission: this firmware has no commands for voltage pulses") from error
-            raise
+        phase, self._failure, *_ = map(float, self._master.command(USER, PULSE_STATE))
         return phase
 
     def _raw(self, name: str, value: float) -> int:

@@ -110,7 +110,7 @@ def direction(drive: OverTheBus, known: Nameplate, wanted_rad_s: float, rough: C
 def _sensor(drive: OverTheBus, known: Nameplate, wanted_rad_s: float, wired: Connection) -> Direction | None:
     """A window without current. The scope captures the angle that the firmware has corrected: its correction, which
     it adapts while the shaft turns, is taken away again."""
-    if not drive.angle_correction():
+    if not drive.tells_angle_correction:
         return None
     _accelerate(drive, known, wanted_rad_s, spin.NAME, spin.TURNED)
     turning.currents(drive, 0.0, 0.0)
