@@ -3,6 +3,7 @@
 
 import math
 import re
+import sys
 import tomllib
 import types
 import typing
@@ -17,6 +18,7 @@ from fluxtrue_tools.errors import FluxtrueError
 
 SIZE_MAX = 10_000_000  # bytes; the largest file of the project has two thousand
 TOO_LARGE = "too_large"  # kind of error of a number whose magnitude is above the next one
+NOT_FINITE = "finite_number"  # pydantic's: NaN or infinity
 LARGEST = 1e12  # of a number in any of the units: what is larger is a slip, and its square may overflow
 SHOWN_MAX = 60  # characters of a bad value in a message
 UNITS = {
@@ -27,6 +29,8 @@ UNITS = {
 }  # fmt: skip
 NOT_A_UNIT = {"observer_m"}
 OF_KEY = {"iron_loss_hysteresis": "W/(rad/s·(V·s)²)", "iron_loss_eddy": "W/((rad/s)²·(V·s)²)"}
+DIGITS_KEPT = 400
+DIGITS = re.compile(rf"[0-9](?:_?[0-9]){{{DIGITS_KEPT},}}")
 _UNIT = re.compile(rf"_({'|'.join(UNITS)})(?:_[abc])?$")
 
 
@@ -51,15 +55,20 @@ class PartError(ValueError):
 Model = TypeVar("Model", bound=BaseModel)
 
 
-def number(value: Any) -> Any:
-    """TOML distinguishes 1 and 1.0, which means the same here."""
+def any_number(value: Any) -> Any:
+    """TOML distinguishes 1 and 1.0, which means the same here. Of any magnitude: its range is checked elsewhere."""
     if not isinstance(value, int | float) or isinstance(value, bool):
         return value
     try:
-        found = float(value)
+        return float(value)
     except OverflowError:
-        return math.inf
-    if LARGEST < abs(found) < math.inf:
+        return sys.float_info.max if value > 0 else -sys.float_info.max
+
+
+def number(value: Any) -> Any:
+    """The same, of a magnitude that is possible in any of the units."""
+    found = any_number(value)
+    if isinstance(found, float) and LARGEST < abs(found) < math.inf:
         raise PydanticCustomError(
             TOO_LARGE, "a number of a smaller magnitude"
         )  # explain() says which numbers are allowed
@@ -68,10 +77,11 @@ def number(value: Any) -> Any:
 
 def flag(value: Any) -> Any:
     """Names of the controller take numbers; true and false are 1 and 0."""
-    return float(value) if isinstance(value, bool) else number(value)
+    return float(value) if isinstance(value, bool) else any_number(value)
 
 
 Number = Annotated[float, BeforeValidator(number)]
+AnyNumber = Annotated[float, BeforeValidator(any_number)]  # the simulation knows its range (sim/library.py)
 Flag = Annotated[float, BeforeValidator(flag)]
 
 
@@ -91,11 +101,12 @@ def down(value: float) -> float:
 
 def quantity(key: str, value: Any) -> str:
     """`key = value unit` as a short text."""
-    shown = repr(value)
+    huge = isinstance(value, float) and abs(value) == sys.float_info.max
+    shown = f"{value:.3g}" if huge else repr(value)
     shown = shown if len(shown) <= SHOWN_MAX else f"{shown[: SHOWN_MAX - 3]}..."
     last = [part for part in key.split(".") if not part.isdigit()][-1]
     unit = unit_of(last) if isinstance(value, int | float) and not isinstance(value, bool) else ""
-    return f"{key} = {shown} {unit}".rstrip()
+    return f"{key} = {shown} {unit}".rstrip() + (" or beyond" if huge else "")
 
 
 def _leaf(annotation: Any, location: Iterable[int | str]) -> tuple[Any, list[Any]]:
@@ -176,7 +187,7 @@ def explain(error: ValidationError, model: type[BaseModel], words: dict[str, str
     where = ".".join(map(str, location))
     if first["type"] == "extra_forbidden":
         return f"{where}: unknown key, allowed: {_keys(model, location)}"
-    what = (words or {}).get(where) or allowed(model, location, first["type"] == TOO_LARGE)
+    what = (words or {}).get(where) or allowed(model, location, first["type"] in (TOO_LARGE, NOT_FINITE))
     if first["type"] == "missing":
         return f"{where}: missing, wanted: {what}"
     if first["type"] == "value_error":
@@ -208,12 +219,23 @@ def read_text(path: Path) -> str:
         raise FluxtrueError(f"{str(path)!r}: cannot be read ({error})") from None
 
 
+def loads(text: str, name: str) -> dict[str, Any]:
+    """A file's text as TOML. Python reads no whole number of more than 4300 digits; with its first ones it is still
+    larger than any that is allowed, and its key is named by whoever checks it."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise FluxtrueError(f"{name}: not valid TOML: {error}") from None
+    except (ValueError, RecursionError) as error:
+        shorter = DIGITS.sub(lambda match: match[0][:DIGITS_KEPT], text)
+        if shorter == text:
+            raise FluxtrueError(f"{name}: not valid TOML: {error}") from None
+        return loads(shorter, name)
+
+
 def parse(model: type[Model], text: str, name: str, complain: Callable[[ValidationError], str] | None = None) -> Model:
     """A file's text as its model; `name` is for messages."""
-    try:
-        data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # tomllib's own error is a ValueError
-        raise FluxtrueError(f"{name}: not valid TOML: {error}") from None
+    data = loads(text, name)
     try:
         return model.model_validate(data)
     except ValidationError as error:

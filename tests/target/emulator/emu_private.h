@@ -279,8 +279,8 @@ static inline uint32_t code_place(uint32_t address)
 }
 
 /* core.c */
-/** The only way to write the flash and the RAM from outside the program, also in its place (DMA, exception frames): what
- * is known of code there, and what unicorn has translated of it, is discarded. Unicorn would continue to use the latter.
+/** The only way to write flash and RAM from outside the program, also for DMA and exception frames: what is known of
+ * the code there, and what unicorn has translated of it, is discarded; unicorn would continue to use it.
  * false: there is no memory. */
 bool emu_memory_write(emu_t *emu, uint32_t address, const void *from, uint32_t size);
 void emu_fail(emu_t *emu, const char *format, ...) __attribute__((format(printf, 2, 3)));

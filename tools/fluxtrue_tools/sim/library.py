@@ -2,6 +2,7 @@
 """libfluxtrue_sim.so by ctypes: one `Loop` is one plant with one controller."""
 
 import ctypes
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.strict import LARGEST
 
 CONTROLLERS: Final = {"firmware": 0, "twin": 1}
 UNKNOWN_NAME: Final = -1
@@ -156,6 +158,9 @@ class Loop:
 
     def set(self, name: str, value: float) -> None:
         """A plant parameter ("plant.…") or one of the controller's names."""
+        is_quantity = name != "plant.seed" and not math.isnan(self.get(name))
+        if is_quantity and abs(value) > LARGEST:  # its square may overflow
+            raise LoopError(name, value, OUT_OF_RANGE)
         code = self._library.sim_set(self._sim, name.encode(), value)
         if code != 0:
             raise LoopError(name, value, code)

@@ -197,8 +197,8 @@ def simulate(
     if channels is None:
         channels = (*CHANNELS, *IDENTIFIED) if scenario.controller.kind == "firmware" else CHANNELS
     columns = [column_name(c) for c in channels]
+    check.speed(scenario, motor, 1.0 / motor.plant["pwm_hz"], where)
     with _start(scenario, motor, where) as probe:  # all values of the run, without simulating it
-        check.speed(scenario, motor, probe.period_s, where)
         every = check.rows(scenario, probe.period_s, len(columns), where)
         check.ranges(scenario, motor, probe, where)
     begin = time.thread_time()

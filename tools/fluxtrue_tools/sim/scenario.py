@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scenario file: strict, every field with its unit in the name."""
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -8,11 +9,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from fluxtrue_tools import faults, strict
 from fluxtrue_tools.sim import effects
-from fluxtrue_tools.strict import LARGEST, Flag, Number, PartError, Strict
+from fluxtrue_tools.strict import AnyNumber, Flag, Number, PartError, Strict, any_number
 
 POINTS_MAX = 10_000
 POINTS_ALLOWED = "allowed: a number, or a list of [t, value]"
-RANGE = f"from {-LARGEST:g} to {LARGEST:g}"
+COUNT_MAX = 1_000_000_000  # periods or samples; the simulation has them as whole numbers
 SHARE_ALLOWED = "-1 to 1 (of the motor's torque_max_Nm)"
 
 
@@ -34,19 +35,19 @@ def _check_times(points: list[list[float]]) -> None:
 def _points(value: Any) -> Any:
     """A plain number is constant; a list of [time, value] is piecewise linear."""
     if _is_number(value):
-        if not abs(value) <= LARGEST:
-            raise PartError((), value, f"a finite number {RANGE}")
-        return ((0.0, float(value)),)
+        if not math.isfinite(any_number(value)):
+            raise PartError((), value, "a finite number")
+        return ((0.0, any_number(value)),)
     if not isinstance(value, list) or not value:
         raise ValueError(POINTS_ALLOWED)
     for index, point in enumerate(value):
         pair = isinstance(point, list) and len(point) == 2
-        if not pair or not all(_is_number(x) and abs(x) <= LARGEST for x in point):
-            raise PartError((index,), point, f"[t, value], two finite numbers {RANGE}")
+        if not pair or not all(_is_number(x) and math.isfinite(any_number(x)) for x in point):
+            raise PartError((index,), point, "[t, value], two finite numbers")
     if len(value) > POINTS_MAX:
         raise ValueError(f"{len(value)} points, allowed: up to {POINTS_MAX}")
     _check_times(value)
-    return tuple((float(time), float(one)) for time, one in value)
+    return tuple((any_number(time), any_number(one)) for time, one in value)
 
 
 SHARES = {"torque_share": "torque_Nm", "speed_share": "speed_rpm"}
@@ -54,6 +55,8 @@ Points = Annotated[tuple[tuple[float, float], ...], BeforeValidator(_points)]
 
 Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
+AnyPositive = Annotated[AnyNumber, Field(gt=0)]
+AnyNotNegative = Annotated[AnyNumber, Field(ge=0)]
 
 
 def _three(value: Any) -> Any:
@@ -62,7 +65,7 @@ def _three(value: Any) -> Any:
     return tuple(value)
 
 
-Three = Annotated[tuple[Number, Number, Number], BeforeValidator(_three)]
+Three = Annotated[tuple[AnyNumber, AnyNumber, AnyNumber], BeforeValidator(_three)]
 ThreeFlags = Annotated[tuple[bool, bool, bool], BeforeValidator(_three)]
 
 
@@ -145,25 +148,25 @@ class Mechanics(Strict):
 class Plant(Strict):
     """Deviations of the drive. Left out: the motor's own data without errors."""
 
-    r_ohm_20: Positive | None = None
-    r_temp_coeff_per_K: Number | None = None
-    ld_H: Positive | None = None
-    lq_H: Positive | None = None
-    psi_f_Vs: Positive | None = None
-    magnet_temp_coeff_per_K: Number | None = None
-    rotor_C: Number | None = None
-    lq_scale: Positive | None = None
-    ld_slope_scale: Positive | None = None
-    cross_saturation_scale: Number | None = None
-    iron_k_h: NotNegative | None = None
-    iron_k_e: NotNegative | None = None
-    iron_k_excess: NotNegative | None = None
+    r_ohm_20: AnyPositive | None = None
+    r_temp_coeff_per_K: AnyNumber | None = None
+    ld_H: AnyPositive | None = None
+    lq_H: AnyPositive | None = None
+    psi_f_Vs: AnyPositive | None = None
+    magnet_temp_coeff_per_K: AnyNumber | None = None
+    rotor_C: AnyNumber | None = None
+    lq_scale: AnyPositive | None = None
+    ld_slope_scale: AnyPositive | None = None
+    cross_saturation_scale: AnyNumber | None = None
+    iron_k_h: AnyNotNegative | None = None
+    iron_k_e: AnyNotNegative | None = None
+    iron_k_excess: AnyNotNegative | None = None
     magnet_step_keeps_current: bool | None = None
-    vdc_ripple_V: NotNegative | None = None
-    vdc_ripple_hz: NotNegative | None = None
-    dead_time_s: NotNegative | None = None
-    device_drop_V: NotNegative | None = None
-    leg_knee_A: NotNegative | None = None
+    vdc_ripple_V: AnyNotNegative | None = None
+    vdc_ripple_hz: AnyNotNegative | None = None
+    dead_time_s: AnyNotNegative | None = None
+    device_drop_V: AnyNotNegative | None = None
+    leg_knee_A: AnyNotNegative | None = None
     substeps: Annotated[int, Field(ge=10, le=1000)] | None = None
     ideal_inverter: bool | None = None
     phase_open: ThreeFlags | None = None
@@ -171,46 +174,46 @@ class Plant(Strict):
     switch_open_lower: ThreeFlags | None = None
     switch_shorted_upper: ThreeFlags | None = None
     switch_shorted_lower: ThreeFlags | None = None
-    short_circuit_A: Positive | None = None
-    desaturation_s: NotNegative | None = None
+    short_circuit_A: AnyPositive | None = None
+    desaturation_s: AnyNotNegative | None = None
     desaturation_open: bool | None = None
     drivers_block: bool | None = None
-    series_d_V: float | None = None
-    series_q_V: float | None = None
-    current_full_scale_A: Positive | None = None
+    series_d_V: AnyNumber | None = None
+    series_q_V: AnyNumber | None = None
+    current_full_scale_A: AnyPositive | None = None
     adc_bits: Annotated[int, Field(ge=1, le=24)] | None = None
     current_gain: Three | None = None
     current_offset_A: Three | None = None
-    current_noise_A_rms: NotNegative | None = None
+    current_noise_A_rms: AnyNotNegative | None = None
     current_quantise: bool | None = None
     current_stuck: ThreeFlags | None = None
     current_open: ThreeFlags | None = None
-    converter_reference: Positive | None = None
-    known_voltage_gain: Number | None = None
-    vdc_full_scale_V: Positive | None = None
-    vdc_gain: Number | None = None
+    converter_reference: AnyPositive | None = None
+    known_voltage_gain: AnyNumber | None = None
+    vdc_full_scale_V: AnyPositive | None = None
+    vdc_gain: AnyNumber | None = None
     vdc_quantise: bool | None = None
     phases_swapped: bool | None = None
     angle_reversed: bool | None = None
-    angle_offset_rad: Number | None = None
-    angle_h1_rad: Number | None = None
-    angle_h1_phase: Number | None = None
-    angle_h2_rad: Number | None = None
-    angle_h2_phase: Number | None = None
-    resolver_pole_pairs: Positive | None = None
+    angle_offset_rad: AnyNumber | None = None
+    angle_h1_rad: AnyNumber | None = None
+    angle_h1_phase: AnyNumber | None = None
+    angle_h2_rad: AnyNumber | None = None
+    angle_h2_phase: AnyNumber | None = None
+    resolver_pole_pairs: AnyPositive | None = None
     angle_bits: Annotated[int, Field(ge=0, le=24)] | None = None
-    angle_delay_s: NotNegative | None = None
+    angle_delay_s: AnyNotNegative | None = None
     angle_stuck: bool | None = None
     angle_sine_stuck: bool | None = None
     angle_cosine_stuck: bool | None = None
     angle_length_check: bool | None = None
-    angle_spike_every: Annotated[int, Field(ge=0)] | None = None
-    angle_spike_samples: Annotated[int, Field(ge=0)] | None = None
-    angle_spike_rad: Number | None = None
-    theta_m_rad: Number | None = None
-    coulomb_Nm: NotNegative | None = None
-    stiction_Nm: NotNegative | None = None
-    stribeck_rad_s: Positive | None = None
+    angle_spike_every: Annotated[int, Field(ge=0, le=COUNT_MAX)] | None = None
+    angle_spike_samples: Annotated[int, Field(ge=0, le=COUNT_MAX)] | None = None
+    angle_spike_rad: AnyNumber | None = None
+    theta_m_rad: AnyNumber | None = None
+    coulomb_Nm: AnyNotNegative | None = None
+    stiction_Nm: AnyNotNegative | None = None
+    stribeck_rad_s: AnyPositive | None = None
 
     def values(self) -> dict[str, float]:
         """Names as the simulation has them: arrays end in _a, _b, _c."""

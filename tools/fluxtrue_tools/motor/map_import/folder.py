@@ -107,9 +107,9 @@ def _check_left_out(motor: Path, key: str, value: Any) -> None:
     field = Machine.model_fields[key.removeprefix("machine.")]
     try:
         TypeAdapter(field.annotation, config=ConfigDict(strict=True, allow_inf_nan=False)).validate_python(value)
-    except ValidationError as error:
-        said = error.errors()[0]["msg"]
-        raise FluxtrueError(f"{motor}: {strict.quantity(key, value)}: {said[0].lower()}{said[1:]}; or leave it out, "
+    except ValidationError:
+        allowed = strict.allowed(MotorConfig, tuple(key.split(".")), complete=True)
+        raise FluxtrueError(f"{motor}: {strict.quantity(key, value)}, allowed: {allowed}; or leave it out, "
                             "the imported map gives the flux") from None  # fmt: skip
 
 
@@ -119,11 +119,7 @@ def settings(path: Path, facts: dict[str, Any], motor: Path | None, given: tuple
     for key, value in facts.items():
         found.put(key, value, str(path))
     if motor is not None:
-        try:
-            data = tomllib.loads(strict.read_text(motor))
-        except (ValueError, RecursionError) as error:
-            raise FluxtrueError(f"{motor}: not valid TOML: {error}") from None
-        for key, value in _keys(data).items():
+        for key, value in _keys(strict.loads(strict.read_text(motor), str(motor))).items():
             _check_form(motor, key, value)
             if key in LEFT_OUT:
                 _check_left_out(motor, key, value)
