@@ -29,6 +29,18 @@ def test_the_gains_follow_from_a_tenth_of_the_guessed_inductance() -> None:
     assert back_emf_V == pytest.approx(350.0 / 3.0**0.5, rel=1e-3)
 
 
+def test_a_speed_that_is_given_is_kept_and_not_called_a_guess(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["motor", "start", *UNKNOWN[:-1], "8765.4", "--out", str(tmp_path / "m")]) == 0
+    assert "speed_max_rpm" not in capsys.readouterr().out
+    text = (tmp_path / "m" / "motor.toml").read_text(encoding="utf-8")
+    assert "\nspeed_max_rpm = 8765.4\n" in text
+    assert "\ntorque_max_Nm = " in text and text.count("# guessed") == 4
+    assert run(["motor", "start", *UNKNOWN[:-2], "--out", str(tmp_path / "m")]) == 0
+    assert "speed_max_rpm = 5000" in capsys.readouterr().out
+
+
 def test_without_a_speed_one_is_assumed(tmp_path: Path) -> None:
     assert run(["motor", "start", *UNKNOWN[:-2], "--out", str(tmp_path / "m")]) == 0
     data = tomllib.loads((tmp_path / "m" / "motor.toml").read_text(encoding="utf-8"))

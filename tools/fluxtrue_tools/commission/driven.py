@@ -83,7 +83,7 @@ def nameplate_for(nameplate: Path, pole_pairs: int, scratch: Path) -> Built:
     machine, inverter = config.machine, config.inverter
     guessed = start.guess(machine.i_max_A, inverter.vdc_V, inverter.pwm_hz, pole_pairs, machine.speed_max_rpm)
     text = start.text("nameplate", machine.i_max_A, inverter.vdc_V, inverter.pwm_hz, pole_pairs,
-                      inverter.current_full_scale_A, guessed)  # fmt: skip
+                      inverter.current_full_scale_A, guessed, is_speed_given=True)  # fmt: skip
     scratch.mkdir(parents=True, exist_ok=True)
     (scratch / FILE_NAME).write_text(text, encoding="utf-8")
     return built(load_motor(scratch), scratch)

@@ -24,13 +24,15 @@ DROP_SHARE = 0.01  # of the phase voltage across the resistance at i_max
 ASSUMED_TURN_PERIODS = 30.0  # PWM periods of a turn of the field at maximum speed, where no speed is given
 FULL_SCALE_PER_I_MAX = 1.5
 TORQUE_SHARE = 0.95
+SPEED = "speed_max_rpm"  # the only datum of the machine that may also be given
 INERTIA_PER_NM = 3e-4  # kg m^2: assumed, nothing depends on it before it is measured
 
 
 def guess(
     i_max_A: float, vdc_V: float, pwm_hz: float, pole_pairs: int, speed_max_rpm: float | None
 ) -> dict[str, float]:
-    """Machine data that follow from the nameplate."""
+    """Machine data that follow from the nameplate; a speed that is given is not changed."""
+    given_rpm = speed_max_rpm
     if speed_max_rpm is None:
         speed_max_rpm = float(f"{60.0 * pwm_hz / (ASSUMED_TURN_PERIODS * pole_pairs):.3g}")
     omega = pole_pairs * speed_max_rpm * 2.0 * math.pi / 60.0
@@ -41,17 +43,20 @@ def guess(
     found = {"r_ohm": DROP_SHARE * phase_V / i_max_A, "torque_max_Nm": torque, "speed_max_rpm": speed_max_rpm,
              "inertia_kgm2": INERTIA_PER_NM * torque, "ld_H": SAFE_SHARE * inductance, "lq_H": SAFE_SHARE * inductance,
              "psi_f_Vs": psi_f}  # fmt: skip
-    return {key: float(f"{value:.4g}") for key, value in found.items()}
+    rounded = {key: float(f"{value:.4g}") for key, value in found.items()}
+    return rounded if given_rpm is None else rounded | {SPEED: given_rpm}
 
 
 def text(name: str, i_max_A: float, vdc_V: float, pwm_hz: float, pole_pairs: int, full_scale_A: float,
-         guessed: dict[str, float]) -> str:  # fmt: skip
-    """motor.toml."""
+         data: dict[str, float], is_speed_given: bool) -> str:  # fmt: skip
+    """motor.toml with the data of guess()."""
     lines = [f"{ORIGIN}; `fluxtrue commission` replaces what is guessed.",
              "", "[machine]", f'name = "{name}"', f"pole_pairs = {pole_pairs}", f"i_max_A = {i_max_A:g}",
              "r_temp_coeff_per_K = 0.00393   # copper"]  # fmt: skip
     notes = {"ld_H": "   # a tenth of the guess: gains for any inductance from here on", "lq_H": "   # the same"}
-    lines += [f"{key} = {value!r}{notes.get(key, '   # guessed')}" for key, value in guessed.items()]
+    if is_speed_given:
+        notes[SPEED] = ""
+    lines += [f"{key} = {value!r}{notes.get(key, '   # guessed')}" for key, value in data.items()]
     lines += ["", "[inverter]", f"vdc_V = {vdc_V:g}", f"pwm_hz = {pwm_hz:g}",
               f"dead_time_s = {min(2e-6, 0.02 / pwm_hz)!r}   # assumed", f"current_full_scale_A = {full_scale_A:g}",
               "adc_bits = 12   # assumed", ""]  # fmt: skip
@@ -91,12 +96,13 @@ def start(out: Path, i_max: float, vdc: float, pwm: float, pole_pairs: int, spee
     from fluxtrue_tools.motor.map_import.folder import name_from
 
     _check_free(out)
-    guessed = guess(i_max, vdc, 1e3 * pwm, pole_pairs, speed_max)
+    data = guess(i_max, vdc, 1e3 * pwm, pole_pairs, speed_max)
     with paths.outputs() as outputs:
         staging = outputs.scratch(out)
         wanted = text(name_from(out), i_max, vdc, 1e3 * pwm, pole_pairs, full_scale or FULL_SCALE_PER_I_MAX * i_max,
-                      guessed)  # fmt: skip
+                      data, speed_max is not None)  # fmt: skip
         (staging / FILE_NAME).write_text(wanted, encoding="utf-8")
         _check(staging)
     click.echo(f"nameplate written to {out}; guessed: "
-               + ", ".join(f"{key} = {value:g}" for key, value in guessed.items()))  # fmt: skip
+               + ", ".join(f"{key} = {value:g}" for key, value in data.items()
+                           if key != SPEED or speed_max is None))  # fmt: skip
