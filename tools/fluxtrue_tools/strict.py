@@ -220,8 +220,8 @@ def read_text(path: Path) -> str:
 
 
 def loads(text: str, name: str) -> dict[str, Any]:
-    """A file's text as TOML. Python reads no whole number of more than 4300 digits; with its first ones it is still
-    larger than any that is allowed, and its key is named by whoever checks it."""
+    """A file's text as TOML. Python reads no whole number of more than 4300 digits. Shortened to its first ones it is
+    still larger than any that is allowed, and the check of its key refuses it."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
