@@ -36,12 +36,18 @@ static ab_q15_t stator_flux(const drive_t *drive, const sample_t *sample, fx_pai
     return (ab_q15_t){transform_round(psi_q30.alpha), transform_round(psi_q30.beta)};
 }
 
-/* The tables have the flux of these currents. */
-static bool is_flux_known(const drive_t *drive, const sample_t *sample)
+/* i_d^2 + i_q^2, if the measured currents can be right. */
+static int32_t i_squared_q30(const drive_t *drive, const sample_t *sample)
 {
     const dq_q15_t i = sample->point.i;
+    return drive_currents_add_up(drive, sample) ? i.d * i.d + i.q * i.q : OPEN_SWITCH_NOT_PLAUSIBLE;
+}
+
+/* The tables have the flux of these currents; currents that are not plausible are above any limit. */
+static bool is_flux_known(const drive_t *drive, const sample_t *sample)
+{
     const q15_t i_max = drive->motor->current_reference.i_max;
-    return drive_currents_add_up(drive, sample) && i.d * i.d + i.q * i.q <= i_max * i_max;
+    return i_squared_q30(drive, sample) <= i_max * i_max;
 }
 
 /* The flux in every second period only: its sum has no need of every period, the direction of a current has. */
@@ -51,20 +57,17 @@ static open_switch_t search(drive_t *drive, const sample_t *sample, int32_t angl
     short_circuit_t *state = &drive->fast.short_circuit;
     const open_switch_config_t config = {m->plausibility.i_dead, m->current_reference.i_max,
                                          (q15_t)(m->safe_state.psi_f / 2)};
-    const dq_q15_t i = sample->point.i;
-    const bool plausible = drive_currents_add_up(drive, sample);
-    const int32_t i_squared_q30 = plausible ? i.d * i.d + i.q * i.q : OPEN_SWITCH_NOT_PLAUSIBLE;
+    const int32_t i_squared = i_squared_q30(drive, sample);
     const uint32_t step_q16 = (uint32_t)fx_abs_q31(angle_step) >> 16;
     state->searches_flux = !state->searches_flux;
     if (state->searches_flux) {
         const ab_q15_t psi = stator_flux(drive, sample, rotation);
-        const open_switch_t found = open_switch_by_flux(&config, &state->open_switch, psi, i_squared_q30,
-                                                        2U * step_q16);
+        const open_switch_t found = open_switch_by_flux(&config, &state->open_switch, psi, i_squared, 2U * step_q16);
         if (found != OPEN_SWITCH_NONE) {
             return found;
         }
     }
-    const open_switch_in_t in = {measure_phases(sample->i_ab, sample->zero_q28), i_squared_q30, step_q16,
+    const open_switch_in_t in = {measure_phases(sample->i_ab, sample->zero_q28), i_squared, step_q16,
                                  state->side == SHORT_CIRCUIT_UPPER};
     return open_switch_by_currents(&config, &state->open_switch, &in);
 }

@@ -116,6 +116,12 @@ static inline q31_t fx_neg_q31(q31_t a)
 
 q31_t fx_abs_q31(q31_t a);
 
+/* Magnitude by the ones' complement: that of a negative number is one LSB too small, and none saturates. */
+static inline int32_t fx_ones_magnitude(int32_t x)
+{
+    return x ^ (x >> 31);
+}
+
 /* Narrows a Q30 accumulator. The rounding half is added with saturation, so that every int32_t is allowed: the caller
  * has to show only that its sum stays in -2 ... 2 per unit. */
 static inline int32_t fx_round_q15_word(int32_t q30)

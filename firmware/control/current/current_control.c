@@ -100,12 +100,7 @@ static int32_t reciprocal_v_max(const current_control_config_t *config, int32_t 
     return fx_usat_bits(fx_quotient(config->per_ratio_q31, (uint32_t)v_dc), 22) * 512;
 }
 
-/* The magnitude of a negative number is its ones' complement, so that one comparison with a limit is enough. */
-static int32_t ones_magnitude(int32_t x)
-{
-    return x ^ (x >> 31);
-}
-
+/* Back from the magnitude by the ones' complement, with which one comparison with a limit is enough. */
 static int32_t with_sign_of(int32_t magnitude, int32_t x)
 {
     return magnitude ^ (x >> 31);
@@ -114,7 +109,7 @@ static int32_t with_sign_of(int32_t magnitude, int32_t x)
 /* Clamps to [-limit - 1, limit]. */
 static int32_t clamp_symmetric(int32_t x, int32_t limit)
 {
-    return with_sign_of(fx_min_s32(ones_magnitude(x), limit), x);
+    return with_sign_of(fx_min_s32(fx_ones_magnitude(x), limit), x);
 }
 
 /* Largest voltage of one axis inside the unit circle, given the other's magnitude; at least a quarter (CC-11). */
@@ -138,9 +133,9 @@ static dq_q15_t limit_to_circle(dq_q15_t v, int32_t error_d, int32_t turn)
 {
     const uint16_t *circle = fx_circle_table;
     FX_ADDRESS_ONCE(circle);
-    int32_t magnitude_d = ones_magnitude(fx_sat_q15_word(v.d));
+    int32_t magnitude_d = fx_ones_magnitude(fx_sat_q15_word(v.d));
     if ((v.d & error_d) >= 0) {
-        magnitude_d = fx_min_s32(magnitude_d, remaining_for_d(circle, ones_magnitude(fx_sat_q15_word(v.q))));
+        magnitude_d = fx_min_s32(magnitude_d, remaining_for_d(circle, fx_ones_magnitude(fx_sat_q15_word(v.q))));
     }
     const int32_t d = with_sign_of(magnitude_d, v.d);
     const int32_t excess = fx_sat_q15_word(v.d - d);

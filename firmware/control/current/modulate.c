@@ -59,7 +59,7 @@ typedef struct {
  * rounding of the duty removes the difference. */
 static uint32_t limit_pulse(pulse_limits_t limits, int32_t x_q31, uint32_t *limited)
 {
-    const int32_t distance = x_q31 ^ (x_q31 >> 31);
+    const int32_t distance = fx_ones_magnitude(x_q31);
     int32_t made_q31 = x_q31;
     if (distance >= limits.longest) {
         const int32_t possible = fx_in_register((distance < limits.nearer_rail) ? limits.longest : HALF_Q31);

@@ -197,6 +197,16 @@ void test_q31_negation_and_magnitude_saturate_only_at_minus_one(void)
     }
 }
 
+void test_the_ones_magnitude_of_a_negative_number_is_one_too_small(void)
+{
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, fx_ones_magnitude(INT32_MAX));
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, fx_ones_magnitude(INT32_MIN));
+    TEST_ASSERT_EQUAL_INT32(0, fx_ones_magnitude(0));
+    TEST_ASSERT_EQUAL_INT32(0, fx_ones_magnitude(-1));
+    TEST_ASSERT_EQUAL_INT32(7, fx_ones_magnitude(7));
+    TEST_ASSERT_EQUAL_INT32(6, fx_ones_magnitude(-7));
+}
+
 void test_narrowing_rounds_half_up_and_never_wraps_over_all_of_int32(void)
 {
     TEST_ASSERT_EQUAL_INT16(32767, fx_round_q15(INT32_MAX));
