@@ -104,7 +104,7 @@ def direction(drive: OverTheBus, known: Nameplate, wanted_rad_s: float, rough: C
         _brake(drive, known, wanted_rad_s)
     finally:
         drive.set(spin.COMPENSATION, compensation)
-    return replace(spin.magnet(taken, drive.period_s, known.offset_A), sensor=sensor)
+    return replace(spin.magnet(taken, drive.period_s, known.offset_A, known.pole_pairs), sensor=sensor)
 
 
 def _sensor(drive: OverTheBus, known: Nameplate, wanted_rad_s: float, wired: Connection) -> Direction | None:

@@ -26,12 +26,13 @@ NAME = "spin"
 D_SHARE = 0.06  # of i_max: the larger of the two currents along d
 LEVELS = (1.0, -1.0, 0.5, -0.5, -0.5, 0.5, -1.0, 1.0)  # of it: what drifts evenly is no odd part
 LEVEL_S, WINDOW_S = 0.2, 0.05
+LEVEL_MOST_S = 0.5  # of a level, on a shaft that has not made a turn before
+SHAFT_TURNS = 1.2  # that a level should contain, of a shaft that becomes slower
 SETTLED_SHARE = 1e-3  # of i_max: the mean current of a window is the wanted one
 WINDOWS = 20  # to settle a level
 LONGER, LEAST_TURNED = 1.2, 0.2  # electrical turns: of the window after one without a whole turn
 SLOW_HZ, SLOW_SHARE = 20.0, 0.22  # electrical, and of the reached speed: below, the shaft is accelerated again
 NEAR_SHARE = 0.9  # of the reached speed: more than this is no slow shaft
-LARGE = 0.75  # between the magnitudes of both levels
 COMPENSATION = "dead_time_compensation"
 Q_SHARES = (0.02, 0.04, 0.08, 0.16, 0.25, 0.4)  # of i_max: more while the machine does not accelerate
 ALONG_Q = tuple(1j * share for share in Q_SHARES)
@@ -158,8 +159,19 @@ def brake(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str) -> A
 
 def _is_slow(speed_rad_s: float, top_rad_s: float, known: Nameplate) -> bool:
     """The shaft is to be accelerated again: a small rotor loses its speed before all levels have been measured."""
-    hz, share = known.pole_pairs * abs(speed_rad_s) / turning.TURN, speed_rad_s / top_rad_s
-    return share < SLOW_SHARE or (hz < SLOW_HZ and share < NEAR_SHARE)
+    shaft_hz, share = abs(speed_rad_s) / turning.TURN, speed_rad_s / top_rad_s
+    is_short = LEVEL_S * shaft_hz < SHAFT_TURNS  # a level is no whole turn
+    return share < SLOW_SHARE or ((known.pole_pairs * shaft_hz < SLOW_HZ or is_short) and share < NEAR_SHARE)
+
+
+def _recorded(drive: Capture, known: Nameplate) -> Array:
+    """A level: longer than LEVEL_S on a shaft that has not made a whole turn then."""
+    rows = [turning.advance(drive, LEVEL_S, NAME)]
+    for _ in range(round((LEVEL_MOST_S - LEVEL_S) / WINDOW_S)):
+        if abs(float(np.ptp(np.unwrap(np.vstack(rows)[:, 4])))) > known.pole_pairs * turning.TURN:
+            break
+        rows.append(turning.advance(drive, WINDOW_S, NAME))
+    return np.vstack(rows)
 
 
 def _coast(drive: Capture, known: Nameplate, wanted_rad_s: float, top_rad_s: float) -> list[Array]:
@@ -179,8 +191,8 @@ def _coast(drive: Capture, known: Nameplate, wanted_rad_s: float, top_rad_s: flo
             if _is_slow(speed, top_rad_s, known):
                 speed = _last_speed(drive, accelerate(drive, known, again_rad_s, NAME, TURNED, speed))
             _settle_current(drive, known, level * D_SHARE * known.i_max_A, q_A, speed)
-            taken.append(turning.advance(drive, LEVEL_S, NAME))
-            q_A -= mean_current(taken[-1], known.offset_A).imag
+            taken.append(_recorded(drive, known))
+            q_A -= mean_current(taken[-1], known.offset_A, known.pole_pairs).imag
             speed = _last_speed(drive, taken[-1])
     finally:
         drive.set(COMPENSATION, compensation)
@@ -208,11 +220,16 @@ def _settle_current(drive: Capture, known: Nameplate, i_d_A: float, q_A: float, 
     raise FluxtrueError(f"commission: {NAME}: {i_d_A:.3g} A along d did not settle: {abs(left_A):.2g} A are left")
 
 
-def whole_turns(rows: Array) -> Array:
+def whole_turns(rows: Array, pole_pairs: int = 1) -> Array:
     """The rows of whole electrical turns, and the first of the next: over them the errors of sensors and inverter that
-    turn have no mean."""
+    turn have no mean.
+
+    pole_pairs   of whole turns of the shaft, if it makes one: over them the harmonics of the angle sensor have none
+    """
     theta = np.unwrap(rows[:, 4])
-    turns = math.floor(abs(theta[-1] - theta[0]) / turning.TURN)
+    turned = abs(theta[-1] - theta[0]) / turning.TURN
+    unit = pole_pairs if turned >= pole_pairs else 1
+    turns = unit * math.floor(turned / unit)
     return rows[: int(np.searchsorted(np.abs(theta - theta[0]), turns * turning.TURN)) + 1] if turns else rows
 
 
@@ -221,9 +238,9 @@ def offset_seen(theta_e_rad: Array, offset_A: complex) -> Array:
     return np.asarray(offset_A * np.exp(-1j * theta_e_rad))
 
 
-def mean_current(rows: Array, offset_A: complex) -> complex:
-    """Over whole turns, in the rotor frame."""
-    used = whole_turns(rows)
+def mean_current(rows: Array, offset_A: complex, pole_pairs: int = 1) -> complex:
+    """Over whole_turns(), in the rotor frame."""
+    used = whole_turns(rows, pole_pairs)
     return complex(np.mean(used[:, 0] + 1j * used[:, 1] - offset_seen(used[:, 4], offset_A)))
 
 
@@ -246,6 +263,25 @@ def voltages(rows: Array, period_s: float, periods: int = 1) -> tuple[Array, Arr
     return i, u / (1j * omega * np.sinc(0.5 * omega * period_s / np.pi)), float(omega.mean())
 
 
+@dataclass(frozen=True)
+class _Level:
+    """Means of a window over the angle, which a rotor that becomes slower does not pass evenly."""
+
+    i_A: complex
+    along: complex  # the direction of the current
+    psi_Vs: complex  # (CM-18)
+    omega_rad_s: float
+
+
+def _level(rows: Array, period_s: float, offset_A: complex) -> _Level:
+    i, psi, omega = voltages(rows, period_s)
+    i = i - offset_seen(rows[1:, 4], offset_A)
+    periods = np.arange(len(i))
+    speed = np.polyval(np.polyder(np.polyfit(periods, np.unwrap(rows[1:, 4]), 2)), periods)
+    means = (complex(np.average(each, weights=speed)) for each in (i, i / np.abs(i), psi))
+    return _Level(*means, omega)
+
+
 def _refuse_oscillation(taken: list[Array], largest_A: float) -> None:
     """The voltage of the dead time lies along the mean current only while the current keeps its direction.
 
@@ -258,16 +294,14 @@ def _refuse_oscillation(taken: list[Array], largest_A: float) -> None:
                             "(tools/fluxtrue motor start)")  # fmt: skip
 
 
-def magnet(taken: list[Array], period_s: float, offset_A: complex) -> Magnet:
+def magnet(taken: list[Array], period_s: float, offset_A: complex, pole_pairs: int) -> Magnet:
     """(CM-19): what neither changes its sign with the current, nor grows with its square, nor lies along it."""
     levels = np.array(LEVELS)
-    means = [voltages(whole_turns(rows), period_s) for rows in taken]
-    psi, omega = np.array([flux.mean() for _, flux, _ in means]), np.array([speed for _, _, speed in means])
-    i_A = np.array([mean_current(rows, offset_A) for rows in taken])
+    means = [_level(whole_turns(rows, pole_pairs), period_s, offset_A) for rows in taken]
+    psi, omega = np.array([each.psi_Vs for each in means]), np.array([each.omega_rad_s for each in means])
+    i_A, along = np.array([each.i_A for each in means]), np.array([each.along for each in means])
     _refuse_oscillation(taken, float(np.abs(i_A).max()))
-    along = np.sign(levels) + 1j * i_A.imag / np.abs(i_A.real)
-    large = np.abs(levels) > LARGE
-    matrix = np.column_stack((np.ones(len(levels)), levels, levels**2, large * along / omega, ~large * along / omega))
+    matrix = np.column_stack((np.ones(len(levels)), i_A, levels**2, i_A / omega, along / omega))
     scale = np.linalg.norm(matrix, axis=0)
     inverse = np.linalg.pinv(matrix / scale)
     return Magnet(complex((inverse @ psi)[0] / scale[0]), float(omega.mean()))
@@ -277,7 +311,7 @@ def direction(drive: Capture, known: Nameplate, wanted_rad_s: float, _: Connecti
     """One direction: accelerated, coasting with all levels of the current, and braked."""
     top_rad_s = _last_speed(drive, accelerate(drive, known, wanted_rad_s, NAME, TURNED))
     taken = _coast(drive, known, wanted_rad_s, top_rad_s)
-    found = magnet(taken, drive.period_s, known.offset_A)
+    found = magnet(taken, drive.period_s, known.offset_A, known.pole_pairs)
     brake(drive, known, wanted_rad_s, NAME)
     true = [machine_currents(rows, known.offset_A) for rows in taken]
     return replace(found, sensor=fit([Coasting(rows[:, 5], rows[:, 1], drive.period_s) for rows in true]))
