@@ -35,7 +35,7 @@ static FX_NOT_INLINED int32_t planned_flux(const current_reference_config_t *con
     const int32_t speed = fx_max_s32(fx_abs_q15(in->omega), 1);
     const int32_t v_plan = fx_usat_q15_word(in->v_plan);
     const bool brakes = in->torque_corrected * in->omega < 0;
-    const int32_t drop = brakes ? 0 : 2 * fx_mulhi(config->r_q16 * speed, torque * 65536); /* Q30 */
+    const int32_t drop = brakes ? 0 : 2 * fx_mulhi((int32_t)config->r_q16 * speed, torque * 65536); /* Q30 */
     const int32_t flux = fx_root((uint32_t)fx_max_s32(v_plan * v_plan - drop, 0)) * 32768 / speed;
     return fx_max_s32(flux - in->shift, 0);
 }
