@@ -73,7 +73,7 @@ def test_the_offsets_of_the_sensors_are_no_torque(small: Motor, plate: Nameplate
 
 @pytest.mark.parametrize("seed", [100, 106])
 def test_the_iron_turns_the_flux_linkage_of_a_small_inductance(seed: int, small: Motor, plate: Nameplate) -> None:
-    """By 1.9 and 0.7 mrad beside a sensor that is wrong by up to 17 mrad once and 13 mrad twice per turn; over windows
+    """By 1.9 and 0.6 mrad beside a sensor that is wrong by up to 17 mrad once and 13 mrad twice per turn; over windows
     of electrical turns 0.2 and 1.0 mrad were found. A third is the uncertainty that the folder states."""
     drive, truth = hidden.make("hub", seed, small, plate.i_max_A, connected=False, other_errors=True)
     found = run(drive, chosen(("spin",)), plate, lambda _: None).spun

@@ -35,7 +35,8 @@ static FX_NOT_INLINED int32_t planned_flux(const current_reference_config_t *con
     const int32_t speed = fx_max_s32(fx_abs_q15(in->omega), 1);
     const int32_t v_plan = fx_usat_q15_word(in->v_plan);
     const bool brakes = in->torque_corrected * in->omega < 0;
-    const int32_t drop = brakes ? 0 : 2 * fx_mulhi((int32_t)config->r_q16 * speed, torque * 65536); /* Q30 */
+    /* Q30, below 2^31 for every resistance, speed and torque */
+    const int32_t drop = brakes ? 0 : 2 * fx_mulhi((int32_t)config->r_q16 * speed, torque * 65536);
     const int32_t flux = fx_root((uint32_t)fx_max_s32(v_plan * v_plan - drop, 0)) * 32768 / speed;
     return fx_max_s32(flux - in->shift, 0);
 }
@@ -80,9 +81,9 @@ static q15_t torque_max_identified(const current_reference_config_t *config, con
 
 /* The largest torque reduces the flux that allows it. Slow steps towards it converge where the two depend strongly on
  * each other (CR-16). */
-static int32_t towards(int32_t torque_limit, int32_t torque_max)
+static q15_t towards(int32_t torque_limit, int32_t torque_max)
 {
-    return (3 * torque_limit + torque_max) >> LIMIT_SHIFT;
+    return (q15_t)((3 * torque_limit + torque_max) >> LIMIT_SHIFT);
 }
 
 current_reference_t current_reference_step(const current_reference_config_t *config, const current_reference_in_t *in)
@@ -101,7 +102,7 @@ current_reference_t current_reference_step(const current_reference_config_t *con
     return (current_reference_t){
         .i_ref = i_ref,
         .torque_max = torque_max_reported,
-        .torque_limit = (q15_t)towards(in->torque_limit, torque_max),
+        .torque_limit = towards(in->torque_limit, torque_max_reported),
         .psi_plan = psi,
         .limited = requested > torque_max || psi < config->grid.y0,
         .i_d_limited = i_ref.d != i_d,

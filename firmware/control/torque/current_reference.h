@@ -6,16 +6,16 @@
  *   psi_plan = sqrt(v_plan^2 - 2 r |w| T)/|w| - shift with T > 0 where the torque drives and 0 where it brakes, and
  *     shift the contribution of the identified flux error to |psi|
  *   |T| is first limited to t_max, the largest torque inside voltage and current circle: t_max(psi_plan(torque_limit));
- *     torque_limit approaches t_max by a quarter of the difference in each step. i_d is limited to -i_d_max.
+ *     torque_limit approaches torque_max by a quarter of the difference in each step. i_d is limited to -i_d_max.
  *   torque_max = t_max + dpsi_d i_q(t_max) - dpsi_q i_d(t_max): the largest torque of the machine as identified; here
  *     t_max does not count additional flux from a weak magnet
  * Source   docs/theory/current-reference.md (CR-1) ... (CR-11), (CR-16)
  * Units    per unit
  * Range    psi_plan outside the grid uses the edge: above it is maximum torque per ampere, below it is flagged;
- *          |shift| < 1/2, r < 1
- * Rounding 1 LSB q15 of interpolation
+ *          torque_limit starts at the largest torque, so that the first steps plan too little rather than too much
+ * Rounding 1 LSB q15 of interpolation; 0.7 LSB/|w| in psi_plan; torque_limit ends up to 3 LSB below torque_max
  * Errors   limited: the torque was limited by voltage or current; i_d_limited: i_d was limited
- * Context  1 kHz task; two square roots and two bounded divisions */
+ * Context  1 kHz task; three square roots and two bounded divisions */
 #include <stdbool.h>
 
 #include "fx/lookup.h"
@@ -46,7 +46,7 @@ typedef struct {
 typedef struct {
     dq_q15_t i_ref;
     q15_t torque_max;   /* largest torque of the machine as identified */
-    q15_t torque_limit; /* towards the largest torque of the tables, whose resistive drop reduces that torque */
+    q15_t torque_limit; /* follows torque_max, whose resistive drop reduces it */
     q15_t psi_plan;     /* planned flux: second input of the table */
     bool limited;
     bool i_d_limited;

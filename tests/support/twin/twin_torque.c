@@ -75,11 +75,12 @@ twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_refe
     const double iq_far = twin_lookup(&grid, motor->ref_iq_A, t_far, psi_far);
     const double id_far = twin_lookup(&grid, motor->ref_id_A, t_far, psi_far);
     const double k = 1.5 * motor->pole_pairs;
+    const double reach = fmax(t_far + k * (in->psi_delta * iq_far - in->psi_q_delta * id_far), 0.0);
     return (twin_reference_t){
         .i_ref = {fmax(twin_lookup(&grid, motor->ref_id_A, t, psi), -in->i_d_max),
                   (in->torque_corrected < 0.0) ? -iq : iq},
-        .torque_max = fmax(t_far + k * (in->psi_delta * iq_far - in->psi_q_delta * id_far), 0.0),
-        .torque_limit = in->torque_limit + (t_max - in->torque_limit) / 4.0,
+        .torque_max = reach,
+        .torque_limit = in->torque_limit + (reach - in->torque_limit) / 4.0,
         .psi_plan = psi,
         .limited = fabs(in->torque_corrected) > t_max,
     };

@@ -129,6 +129,31 @@ void test_the_drop_limits_no_torque_that_brakes(void)
     TEST_ASSERT_LESS_THAN_INT((int)((0.2 + 0.4 * PSI_WITHOUT_TORQUE) * 32768.0) - 20, drives);
 }
 
+void test_the_limit_approaches_the_largest_torque_by_a_quarter_of_the_difference(void)
+{
+    in.omega = 26214;
+    in.torque_limit = 4000;
+    const current_reference_t y = step();
+    TEST_ASSERT_INT_WITHIN(1, 4000 + (y.torque_max - 4000) / 4, y.torque_limit);
+}
+
+/* Without torque a weak magnet leaves flux, on which the reach does not count. The drop of a torque that needs this
+ * flux would leave no reach. */
+void test_a_weak_magnet_does_not_take_the_torque_that_the_whole_voltage_allows(void)
+{
+    static int16_t steep[9];
+    for (int k = 0; k < 9; k++) {
+        steep[k] = (int16_t)(6554 * ((k > 4) ? k - 4 : 0)); /* 0.2 for each 1/16 of flux above 0.375 */
+    }
+    f.current_reference.torque_max = steep;
+    f.current_reference.r_q16 = 6554; /* 0.1 */
+    in.omega = 26214;
+    in.torque_corrected = 0;
+    in.shift = -3277;
+    in.psi_d_error = -3277;
+    TEST_ASSERT_GREATER_THAN_INT(3277, settled().torque_max);
+}
+
 /* Near the end of field weakening a little flux is much torque, here 16 times as much, and twice the drop: without the
  * slow approach the limit would alternate between two values. */
 void test_the_limit_settles_where_torque_and_flux_depend_strongly_on_each_other(void)
@@ -272,9 +297,21 @@ void test_at_standstill_there_is_no_division_by_zero(void)
     TEST_ASSERT_EQUAL_INT(INT16_MAX, step().psi_plan);
     in.v_plan = 0;
     TEST_ASSERT_TRUE(step().limited);
-    in.omega = INT16_MIN;
-    in.v_plan = INT16_MAX;
-    (void)step();
+}
+
+/* The largest drop is just below 2^31 in Q30: no sum overflows, and the limit is that of the table's least flux. */
+void test_the_largest_drop_leaves_no_flux(void)
+{
+    f.current_reference.r_q16 = UINT16_MAX;
+    in.torque_limit = INT16_MAX;
+    for (int k = 0; k < 4; k++) {
+        in.omega = (k & 1) ? INT16_MAX : INT16_MIN;
+        in.torque_corrected = (k & 1) ? INT16_MAX : INT16_MIN;
+        in.v_plan = (k & 2) ? INT16_MAX : 0;
+        const current_reference_t y = step();
+        TEST_ASSERT_TRUE(y.limited);
+        TEST_ASSERT_EQUAL_INT(f.current_reference.torque_max[0], y.torque_max);
+    }
 }
 
 /* The planned flux has an error of 1/2 LSB of the quotient and 0.7 LSB of the root divided by |w| > 0.09: below 9 LSB.
@@ -299,6 +336,8 @@ void test_the_references_follow_the_twin_over_torque_speed_and_voltage(void)
                    in.omega);
         worst_note(&worst, y.i_ref.q - s.i_ref.q / f.i * 32768, "i_q of T %d v %d w %d", in.torque_corrected, in.v_plan,
                    in.omega);
+        worst_note(&worst, y.torque_limit - s.torque_limit / f.t * 32768, "next limit of T %d v %d w %d",
+                   in.torque_corrected, in.v_plan, in.omega);
         worst_note(&worst, y.torque_max - s.torque_max / f.t * 32768, "limit of T %d v %d w %d", in.torque_corrected,
                    in.v_plan, in.omega);
     }

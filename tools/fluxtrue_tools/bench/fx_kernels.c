@@ -120,7 +120,7 @@ KERNEL2(div_q15, q15_t, q15_t, q15_t, fx_div_q15(a, b))
 KERNEL2(div_q31, q31_t, int32_t, int32_t, fx_div_q31(a, b))
 KERNEL1(sqrt_q30, q15_t, u32, fx_sqrt_q30(a))
 KERNEL2(magnitude, q15_t, q15_t, q15_t, fx_magnitude(a, b))
-KERNEL2(leg, q15_t, q15_t, q15_t, fx_root((uint32_t)fx_max_s32(a *a - b * b, 0)))
+KERNEL2(leg, q15_t, q15_t, q15_t, fx_root((uint32_t)fx_max_s32(fx_mul_q30(a, a) - fx_mul_q30(b, b), 0)))
 /* As an inlined caller has them: each in a register of its own (r0 and r1). */
 static inline int64_t sincos_in_registers(uint16_t angle)
 {

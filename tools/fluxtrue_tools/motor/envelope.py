@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Torque over speed: what the references allow at the planned share of the dc voltage."""
+"""Torque over speed at the planned share of the dc voltage, with the resistive drop of i_max along the whole voltage.
+
+The references allow more: they plan with the drop of the torque (CR-2). Where the drop at i_max is 3 % of the voltage,
+the difference is at most that; where it is a fifth, the speed at which the torque ends is that much too low here.
+"""
 
 import numpy as np
 
@@ -8,7 +12,7 @@ from fluxtrue_tools.motor.motor import Motor
 
 
 def available_flux(motor: Motor, speed_rpm: Array) -> Array:
-    """psi_avail = (v_ratio vdc - R i_max)/w, V·s."""
+    """(v_ratio vdc - R i_max)/w, V·s: the least flux that (CR-2) can give."""
     machine = motor.config.machine
     omega = np.maximum(speed_rpm * machine.pole_pairs * 2 * np.pi / 60, 1e-6)
     volts = motor.derived.ref_v_ratio * motor.config.inverter.vdc_V - machine.r_ohm * machine.i_max_A
