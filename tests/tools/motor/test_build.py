@@ -195,10 +195,13 @@ void flux(int n, const int16_t *d, const int16_t *q, int16_t *psi_d, int16_t *ps
     }
 }
 
-void reference(int16_t torque, int16_t v_dc, int16_t omega, int16_t out[2]);
-void reference(int16_t torque, int16_t v_dc, int16_t omega, int16_t out[2])
+void reference(int16_t torque, int16_t v_plan, int16_t omega, int16_t out[2]);
+void reference(int16_t torque, int16_t v_plan, int16_t omega, int16_t out[2])
 {
-    const current_reference_in_t in = {.torque_corrected = torque, .v_dc = v_dc, .omega = omega, .i_d_max = INT16_MAX};
+    const current_reference_in_t in = {.torque_corrected = torque,
+                                       .v_plan = v_plan,
+                                       .omega = omega,
+                                       .i_d_max = INT16_MAX};
     const current_reference_t r = current_reference_step(&motor.current_reference, &in);
     out[0] = r.i_ref.d;
     out[1] = r.i_ref.q;
@@ -259,10 +262,10 @@ def test_the_firmware_reads_the_references_as_the_report_does(firmware, share):
     library, motor = firmware
     torque = int(share * motor.config.machine.torque_max_Nm / motor.bases.torque_Nm * 32768)
     out = (ctypes.c_int16 * 2)()
-    library.reference(torque, int(350 / motor.bases.voltage_V * 32768), 300, out)  # slow: all flux available
+    library.reference(torque, int(200 / motor.bases.voltage_V * 32768), 300, out)  # slow: all flux available
     expected = lookup_references(motor.references, np.array([torque]), np.array([32767]))
     assert (out[0], out[1]) == (int(expected[0][0]), int(expected[1][0]))
-    library.reference(-torque, int(350 / motor.bases.voltage_V * 32768), 300, out)
+    library.reference(-torque, int(200 / motor.bases.voltage_V * 32768), 300, out)
     assert (out[0], out[1]) == (int(expected[0][0]), -int(expected[1][0]))
 
 
