@@ -27,18 +27,20 @@ motor_check_t current_reference_check(const current_reference_config_t *config)
     return (config->i_max > 0) ? MOTOR_CHECK_OK : MOTOR_CHECK_CURRENT_MAX;
 }
 
-/* sqrt(v_plan^2 - 2 r |w| torque)/|w| - shift (CR-2), (CR-9). The quotient may reach 2^30, so that the shift has no
- * effect at low speed, where the voltage does not limit the flux. */
+/* sqrt(v_plan^2 - 2 r |w| torque)/|w| - shift (CR-2), (CR-9), with torque_limit where torque is larger: no more than the
+ * reach is made. The quotient may reach 2^30, so that the shift has no effect at low speed, where the voltage does not
+ * limit the flux. */
 static FX_NOT_INLINED int32_t planned_flux(const current_reference_config_t *config, const current_reference_in_t *in,
                                            int32_t torque)
 {
     const int32_t speed = fx_max_s32(fx_abs_q15(in->omega), 1);
     const int32_t v_plan = fx_usat_q15_word(in->v_plan);
     const bool brakes = in->torque_corrected * in->omega < 0;
+    const int32_t driving = brakes ? 0 : fx_min_s32(torque, in->torque_limit);
     /* Q30, below 2^31 for every resistance, speed and torque */
-    const int32_t drop = brakes ? 0 : 2 * fx_mulhi((int32_t)config->r_q16 * speed, torque * 65536);
+    const int32_t drop = 2 * fx_mulhi((int32_t)config->r_q16 * speed, driving * 65536);
     const int32_t flux = fx_root((uint32_t)fx_max_s32(v_plan * v_plan - drop, 0)) * 32768 / speed;
-    return fx_max_s32(flux - in->shift, 0);
+    return flux - in->shift;
 }
 
 /* Interpolation between table nodes may slightly exceed the current circle: i_d is kept and i_q reduced (CR-7). */
@@ -72,7 +74,7 @@ static FX_NOT_INLINED int32_t torque_max_from_table(const current_reference_conf
 static q15_t torque_max_identified(const current_reference_config_t *config, const current_reference_in_t *in,
                                    int32_t planned)
 {
-    const int32_t psi = fx_sat_q15_word(planned + fx_min_s32(in->shift, 0));
+    const int32_t psi = fx_usat_q15_word(planned + fx_min_s32(in->shift, 0));
     const int32_t torque_max = torque_max_from_table(config, psi);
     const dq_q15_t i = currents_from_table(config, torque_max, psi);
     const int32_t identified = fx_mul_q15(in->psi_d_error, i.q) - fx_mul_q15(in->psi_q_delta, i.d);
@@ -83,21 +85,21 @@ static q15_t torque_max_identified(const current_reference_config_t *config, con
  * each other (CR-16). */
 static q15_t towards(int32_t torque_limit, int32_t torque_max)
 {
-    return (q15_t)((3 * torque_limit + torque_max) >> LIMIT_SHIFT);
+    return (q15_t)(torque_limit + ((torque_max - torque_limit) >> LIMIT_SHIFT));
 }
 
 current_reference_t current_reference_step(const current_reference_config_t *config, const current_reference_in_t *in)
 {
     const int32_t planned_max = planned_flux(config, in, in->torque_limit);
-    const int32_t torque_max = torque_max_from_table(config, fx_sat_q15_word(planned_max));
+    const int32_t torque_max = torque_max_from_table(config, fx_usat_q15_word(planned_max));
     const q15_t torque_max_reported = torque_max_identified(config, in, planned_max);
 
     const int32_t requested = fx_abs_q15(in->torque_corrected);
+    const q15_t psi = (q15_t)fx_usat_q15_word(planned_flux(config, in, requested));
     const int32_t torque = fx_min_s32(requested, torque_max);
-    const q15_t psi = fx_sat_q15(planned_flux(config, in, torque));
     dq_q15_t i_ref = limit_to_current_circle(currents_from_table(config, torque, psi), config->i_max);
-    const int32_t i_d = i_ref.d;
-    i_ref.d = fx_max_s32(i_d, -in->i_d_max); /* (CR-11) */
+    const bool i_d_limited = i_ref.d < -in->i_d_max;
+    i_ref.d = fx_max_s32(i_ref.d, -in->i_d_max); /* (CR-11) */
     i_ref.q = (in->torque_corrected < 0) ? -i_ref.q : i_ref.q;
     return (current_reference_t){
         .i_ref = i_ref,
@@ -105,6 +107,6 @@ current_reference_t current_reference_step(const current_reference_config_t *con
         .torque_limit = towards(in->torque_limit, torque_max_reported),
         .psi_plan = psi,
         .limited = requested > torque_max || psi < config->grid.y0,
-        .i_d_limited = i_ref.d != i_d,
+        .i_d_limited = i_d_limited,
     };
 }

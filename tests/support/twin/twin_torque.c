@@ -68,7 +68,7 @@ twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_refe
     const double planned_max = planned_flux(motor, in, in->torque_limit);
     const double t_max = twin_lookup(&row, motor->ref_torque_max_Nm, 0.0, fmin(planned_max, psi_top));
     const double t = fmin(fabs(in->torque_corrected), t_max);
-    const double psi = fmin(planned_flux(motor, in, t), psi_top);
+    const double psi = fmin(planned_flux(motor, in, fmin(fabs(in->torque_corrected), in->torque_limit)), psi_top);
     const double iq = twin_lookup(&grid, motor->ref_iq_A, t, psi);
     const double psi_far = planned_max + fmin(in->shift, 0.0);
     const double t_far = twin_lookup(&row, motor->ref_torque_max_Nm, 0.0, psi_far);

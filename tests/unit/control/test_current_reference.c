@@ -94,6 +94,7 @@ void test_the_available_flux_is_the_planned_voltage_over_the_speed(void)
 /* The current that drives has its voltage along that of the rotating magnet; 0.25 of torque cost 0.7 % of the flux. */
 void test_torque_that_drives_reduces_the_planned_flux_and_torque_that_brakes_does_not(void)
 {
+    in.torque_limit = INT16_MAX;
     for (int k = 0; k < 4; k++) {
         const bool backward = (k & 1) != 0, brakes = (k & 2) != 0;
         in.omega = backward ? -26214 : 26214;
