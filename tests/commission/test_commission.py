@@ -56,10 +56,10 @@ def test_map_and_resistance_of_a_hidden_machine(name: str, seed: int, unknown: M
 
 
 def test_a_rotor_that_moves_at_a_level_is_measured_until_it_does(unknown: Motor, known: Nameplate) -> None:
-    """Where the shaft rests the harmonics of the angle sensor give the direct current a part along q: every try at
-    -0.85 i_max ends before its time."""
-    drive, truth = hidden.make("hsm1", 110, unknown, known.i_max_A, connected=False, other_errors=True)
-    found = run(drive, chosen(("drag", "resistance")), known, lambda _: None)
+    """Where the shaft rests the harmonics of the angle sensor give the direct current a part along q: two tries
+    at a level end before their time."""
+    drive, truth = hidden.make("hsm1", 115, unknown, known.i_max_A, connected=False, other_errors=True)
+    found = run(drive, chosen(("phases", "resistance")), known, lambda _: None)
     assert found.resistance is not None and any(raw.failure == MOVED for raw in found.levels)
     error, _ = resistance_error(found.resistance.r_ohm, truth)
     print(f"R {100 * error:+.2f} %")
