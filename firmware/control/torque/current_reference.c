@@ -27,9 +27,9 @@ motor_check_t current_reference_check(const current_reference_config_t *config)
     return (config->i_max > 0) ? MOTOR_CHECK_OK : MOTOR_CHECK_CURRENT_MAX;
 }
 
-/* sqrt(v_plan^2 - 2 r |w| torque)/|w| - shift (CR-2), (CR-9), with torque_limit where torque is larger: no more than the
- * reach is made. The quotient may reach 2^30, so that the shift has no effect at low speed, where the voltage does not
- * limit the flux. */
+/* sqrt(v_plan^2 - 2 r |w| torque)/|w| - shift (CR-2), (CR-9), with torque_limit where torque is larger: no more than
+ * the reach is made. The quotient may reach 2^30, so that the shift has no effect at low speed, where the voltage does
+ * not limit the flux. */
 static FX_NOT_INLINED int32_t planned_flux(const current_reference_config_t *config, const current_reference_in_t *in,
                                            int32_t torque)
 {
