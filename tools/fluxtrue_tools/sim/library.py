@@ -158,8 +158,8 @@ class Loop:
 
     def set(self, name: str, value: float) -> None:
         """A plant parameter ("plant.…") or one of the controller's names."""
-        is_quantity = name != "plant.seed" and not math.isnan(self.get(name))
-        if is_quantity and abs(value) > LARGEST:  # its square may overflow
+        is_too_large = abs(value) > LARGEST and name != "plant.seed"  # the square of a quantity may overflow
+        if is_too_large and not math.isnan(self.get(name)):  # an unknown name is told by the simulation
             raise LoopError(name, value, OUT_OF_RANGE)
         code = self._library.sim_set(self._sim, name.encode(), value)
         if code != 0:
