@@ -69,8 +69,8 @@ static FX_NOT_INLINED int32_t torque_max_from_table(const current_reference_conf
 }
 
 /* t_max + dpsi_d i_q - dpsi_q i_d at the currents of t_max: the tables' torque corrected by the identified flux
- * (CR-10). Only a negative shift is used. A positive one means that a weak magnet leaves additional flux at the present
- * point; at the largest torque, where psi_d is small, it need not. */
+ * (CR-10). A negative shift is taken back: a weak magnet leaves additional flux at the present point; at the largest
+ * torque, where psi_d is small, it need not. */
 static q15_t torque_max_identified(const current_reference_config_t *config, const current_reference_in_t *in,
                                    int32_t planned)
 {
