@@ -14,16 +14,18 @@ static q15_t variance_reduction(const identify_state_t *state, identify_index_t 
     return (q15_t)fx_max_s32(Q15_MAX - (state->kalman.p_q30[kalman_p_index(index, index)] >> 15), 0);
 }
 
-/* The values that act on the torque are zero until recalled values have been confirmed (drive/recall.h). */
-static identification_t robust_identification(const drive_t *drive, const identify_out_t *out)
+/* iron: nominal admittance. The values that act on the torque are zero until recalled values have been confirmed (drive/recall.h). */
+static identification_t robust_identification(const drive_t *drive, const identify_out_t *out, q31_t iron)
 {
     const identify_config_t *config = &drive->motor->identify;
     const identify_state_t *state = &drive->task.identify;
     const bool acts = !drive->task.recall.unconfirmed;
+    const q31_t iron_scale = acts ? identify_value(config, state, IDENTIFY_IRON) : 0;
     return (identification_t){
         .psi_delta = identify_value(config, state, IDENTIFY_FLUX),
         .r_delta = fx_add_q31(state->kept.r_prior - config->r0, identify_value(config, state, IDENTIFY_R)),
         .lq_error = acts ? identify_value(config, state, IDENTIFY_LQ) : 0,
+        .iron_admittance = fx_add_q31(iron, fx_mul_q31(iron, iron_scale)),
         .torque_variance_q30 = state->torque_variance_q30,
         .psi_d_error = acts ? (q15_t)out->psi_d_error : (q15_t)0,
         .torque_estimated = (q15_t)out->torque,
@@ -53,7 +55,7 @@ static void robust_step(drive_t *drive, const snapshot_t *snapshot)
     const identify_out_t out = identify_step(&m->identify, &task->identify, &in);
     drive_trim(drive, (q15_t)snapshot->sample.v_dc);
     task->identifications = task->identifications + 1U;
-    task->identification = robust_identification(drive, &out);
+    task->identification = robust_identification(drive, &out, point.iron);
     task->psi_d_error = task->identification.psi_d_error;
 }
 

@@ -17,6 +17,7 @@ void mrai_identify(drive_t *drive, const snapshot_t *snapshot)
         .psi_delta = law->psi_delta,
         .r_delta = law->r_delta,
         .lq_error = 0,                  /* not identified: the psi_q of the tables holds */
+        .iron_admittance = 0,           /* not part of this law */
         .torque_variance_q30 = Q31_MAX, /* not stated by this law: the loop may use all of its authority */
         .psi_d_error = snapshot->psi_d_error,
         .torque_estimated = torque_estimate_mean(&task->torque_mean, &snapshot->mrai.torque),

@@ -41,7 +41,7 @@ struct twin {
     twin_torque_estimate_t torque_mean;
     twin_window_t window, complete;
     twin_identify_t identify;
-    double torque_estimated, psi_delta; /* of the identification that is selected */
+    double torque_estimated, psi_delta, iron_admittance; /* of the identification that is selected */
     twin_torque_state_t torque_state;
     double torque_commanded;
     bool modulation_limited;
