@@ -3,18 +3,17 @@
 
 void drive_init(drive_t *drive, const motor_t *source)
 {
-    *drive = (drive_t){
-        .motor = source,
-        .period = {source->measure, source->angle_tracker, source->monitor, source->flux_table,
-                   source->bases.periods_per_step},
-        .parameters = source->parameters,
-        .request = {.torque_loop = true,
-                    .identification = true,
-                    .trim = true,
-                    .identification_mode = IDENTIFICATION_ROBUST,
-                    .limits = TORQUE_LIMITS_NONE},
-        .fast.step_end = source->bases.periods_per_step,
-        .task.reference = {.torque_max = source->torque_max, .torque_limit = source->torque_max, .psi_plan = Q15_MAX}};
+    *drive = (drive_t){.motor = source,
+                       .period = {source->measure, source->angle_tracker, source->monitor, source->flux_table,
+                                  source->bases.periods_per_step},
+                       .parameters = source->parameters,
+                       .request = {.torque_loop = true,
+                                   .identification = true,
+                                   .trim = true,
+                                   .identification_mode = IDENTIFICATION_ROBUST,
+                                   .limits = TORQUE_LIMITS_NONE},
+                       .fast.step_end = source->bases.periods_per_step,
+                       .task.reference = current_reference_start(source->torque_max)};
     mrai_init(drive);
     identify_reset(&drive->motor->identify, &drive->task.identify);
     data_check_start(drive);

@@ -100,10 +100,10 @@ typedef struct {
     identify_window_t window;     /* of the robust identification, being summed up */
     uint8_t periods_since_enable; /* saturates at 3: from then on the voltage of the whole last period is known */
     uint8_t silent_steps;         /* in a row in which the task wrote no command */
-    uint32_t step_end;            /* generation of the sample that completes the present step of the task */
-    uint32_t command_seen;        /* generation of the last command that the task wrote in time */
     uint8_t motor_check;          /* motor_check_t: the first check of the motor data that failed */
     bool is_settled;              /* the bridge runs, no fault, no counter: the next period can take the usual route */
+    uint32_t step_end;            /* generation of the sample that completes the present step of the task */
+    uint32_t command_seen;        /* generation of the last command that the task wrote in time */
     short_circuit_t short_circuit;
     uint32_t fault_resets;                   /* of the command, as far as carried out */
     volatile uint32_t faults;                /* latched */

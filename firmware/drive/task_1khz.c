@@ -165,8 +165,7 @@ static void reset_torque_path(drive_t *drive)
     task->torque_loop = (torque_loop_state_t){0};
     task->torque_limit.loss = 0;
     task->derating = 0;
-    task->reference = (current_reference_t){
-        .torque_max = drive->motor->torque_max, .torque_limit = drive->motor->torque_max, .psi_plan = Q15_MAX};
+    task->reference = current_reference_start(drive->motor->torque_max);
     task->voltage_reserve = (voltage_reserve_state_t){0};
     task->allowed.torque_limited = 0;
     task->torque_commanded = 0;

@@ -45,7 +45,7 @@ def test_the_losses_are_those_of_the_machine(hsm1: Motor, reported: Losses, spee
         loop.record(("truth.copper_W", "truth.iron_W", "truth.torque_mean_Nm"), 1)
         copper_W, iron_W, torque = loop.run(2000).mean(axis=0)
     assert torque == pytest.approx(torque_Nm, rel=0.02)
-    # The references of the figure leave out the current of the iron loss and plan for the largest drop.
+    # The figure leaves out the current of the iron loss and plans for the largest drop.
     assert at(reported, reported.copper_W, torque_Nm, speed_rpm) == pytest.approx(copper_W, rel=0.08)
     assert at(reported, reported.iron_W, torque_Nm, speed_rpm) == pytest.approx(iron_W, rel=0.08)
 

@@ -44,13 +44,19 @@ typedef struct {
 } current_reference_in_t;
 
 typedef struct {
-    dq_q15_t i_ref;      /* of the magnetising current */
+    dq_q15_t i_ref;     /* of the magnetising current */
     q15_t torque_max;   /* largest torque of the machine as identified */
     q15_t torque_limit; /* follows torque_max, whose resistive drop reduces it */
     q15_t psi_plan;     /* planned flux: second input of the table */
     bool limited;
     bool i_d_limited;
 } current_reference_t;
+
+/** Before the first step: the machine's largest torque and no limit of the flux. */
+static inline current_reference_t current_reference_start(q15_t torque_max)
+{
+    return (current_reference_t){.torque_max = torque_max, .torque_limit = torque_max, .psi_plan = Q15_MAX};
+}
 
 motor_check_t current_reference_check(const current_reference_config_t *config);
 current_reference_t current_reference_step(const current_reference_config_t *config, const current_reference_in_t *in);

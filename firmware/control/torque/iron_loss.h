@@ -23,7 +23,9 @@ static inline dq_q15_t iron_loss_add(const iron_loss_in_t *in, dq_q15_t magnetis
     /* Q31 * Q31 = Q30 in the upper word */
     const int32_t d = magnetising.d - fx_round_q15_word(fx_mulhi(a, fx_sat_q15_word(in->psi.q) * 65536));
     const int32_t q = magnetising.q + fx_round_q15_word(fx_mulhi(a, fx_sat_q15_word(in->psi.d) * 65536));
-    return current_circle_limit((dq_q15_t){fx_sat_q15_word(d), fx_sat_q15_word(q)}, in->i_max);
+    const dq_q15_t inside = current_circle_limit((dq_q15_t){fx_sat_q15_word(d), fx_abs_q15(fx_sat_q15_word(q))},
+                                                 in->i_max);
+    return (dq_q15_t){inside.d, (q < 0) ? -inside.q : inside.q};
 }
 
 #endif

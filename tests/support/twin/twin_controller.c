@@ -4,14 +4,19 @@
 
 #include "twin/twin_private.h"
 
+static twin_reference_t reference_start(const twin_t *twin)
+{
+    const double torque_max = twin->motor.torque_max_Nm;
+    return (twin_reference_t){.torque_max = torque_max, .torque_limit = torque_max, .psi_plan = HUGE_VAL};
+}
+
 twin_t *twin_create(void)
 {
     twin_t *twin = calloc(1, sizeof *twin);
     if (twin != NULL) {
         twin->motor = motor_si;
         twin->compensation = 1.0;
-        twin->reference = (twin_reference_t){
-            .torque_max = twin->motor.torque_max_Nm, .torque_limit = twin->motor.torque_max_Nm, .psi_plan = HUGE_VAL};
+        twin->reference = reference_start(twin);
         twin->torque_loop = true;
         twin->identification = true;
         twin->schedule.voltage_scale = 1.0;
@@ -186,8 +191,7 @@ static void task(twin_t *twin)
         twin->rotating = (twin_rotating_t){.psi = {twin->sample.flux.psi_d, twin->sample.flux.psi_q}};
         twin->torque_commanded = 0.0;
         twin->torque_state = (twin_torque_state_t){0};
-        twin->reference = (twin_reference_t){
-            .torque_max = twin->motor.torque_max_Nm, .torque_limit = twin->motor.torque_max_Nm, .psi_plan = HUGE_VAL};
+        twin->reference = reference_start(twin);
         twin->limit.loss_W = 0.0;
         twin->trim = 0.0;
         twin->i_ref = (twin_dq_t){0.0, 0.0};

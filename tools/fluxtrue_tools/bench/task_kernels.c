@@ -4,6 +4,7 @@
  * the task is: small, but for what is in fast_sources.txt, which is called, not compiled in. */
 #include <string.h>
 
+#include "control/torque/iron_loss.h"
 #include "drive/drive.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/slow_monitors.h"
@@ -216,6 +217,12 @@ CALLED void task_reference(void)
         .psi_q_delta = 0,
     };
     d->task.reference = current_reference_step(&d->motor->current_reference, &in);
+    const iron_loss_in_t iron = {
+        .admittance = d->task.identification.iron_admittance,
+        .psi = {d->task.psi_ref.d + d->task.identification.psi_d_error, d->task.psi_ref.q},
+        .i_max = d->motor->current_reference.i_max,
+    };
+    d->task.reference.i_ref = iron_loss_add(&iron, d->task.reference.i_ref);
 }
 
 CALLED void task_target(void)
