@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "control/identify/iron.h"
 #include "drive/drive.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/recall.h"
@@ -14,22 +15,32 @@ static q15_t variance_reduction(const identify_state_t *state, identify_index_t 
     return (q15_t)fx_max_s32(Q15_MAX - (state->kalman.p_q30[kalman_p_index(index, index)] >> 15), 0);
 }
 
-/* iron: nominal admittance. The values that act on the torque are zero until recalled values have been confirmed (drive/recall.h). */
-static identification_t robust_identification(const drive_t *drive, const identify_out_t *out, q31_t iron)
+/* a of (CR-18) at the tracked speed: that of a window may be wrong when the window is not valid. The identified scale
+ * of the loss counts as far as the estimate is trusted. */
+static q31_t iron_admittance(const drive_t *drive, q31_t omega, q15_t confidence)
+{
+    const identify_config_t *config = &drive->motor->identify;
+    const q31_t nominal = identify_iron_admittance(config, omega);
+    const q31_t scale = identify_value(config, &drive->task.identify, IDENTIFY_IRON);
+    return fx_add_q31(nominal, fx_mul_q31(nominal, fx_mul_q31(scale, fx_q31_from_q15(confidence))));
+}
+
+/* The values that act on the torque are zero until recalled values have been confirmed (drive/recall.h), or nominal. */
+static identification_t robust_identification(const drive_t *drive, const identify_out_t *out, q31_t omega)
 {
     const identify_config_t *config = &drive->motor->identify;
     const identify_state_t *state = &drive->task.identify;
     const bool acts = !drive->task.recall.unconfirmed;
-    const q31_t iron_scale = acts ? identify_value(config, state, IDENTIFY_IRON) : 0;
+    const q15_t confidence = acts ? state->kept.confidence : (q15_t)0;
     return (identification_t){
         .psi_delta = identify_value(config, state, IDENTIFY_FLUX),
         .r_delta = fx_add_q31(state->kept.r_prior - config->r0, identify_value(config, state, IDENTIFY_R)),
         .lq_error = acts ? identify_value(config, state, IDENTIFY_LQ) : 0,
-        .iron_admittance = fx_add_q31(iron, fx_mul_q31(iron, iron_scale)),
+        .iron_admittance = iron_admittance(drive, omega, confidence),
         .torque_variance_q30 = state->torque_variance_q30,
         .psi_d_error = acts ? (q15_t)out->psi_d_error : (q15_t)0,
         .torque_estimated = (q15_t)out->torque,
-        .confidence = acts ? state->kept.confidence : (q15_t)0,
+        .confidence = confidence,
         .psi_quality = variance_reduction(state, IDENTIFY_FLUX),
         .r_quality = variance_reduction(state, IDENTIFY_R),
         .psi_clamped = is_at_limit(state, IDENTIFY_FLUX),
@@ -55,7 +66,7 @@ static void robust_step(drive_t *drive, const snapshot_t *snapshot)
     const identify_out_t out = identify_step(&m->identify, &task->identify, &in);
     drive_trim(drive, (q15_t)snapshot->sample.v_dc);
     task->identifications = task->identifications + 1U;
-    task->identification = robust_identification(drive, &out, point.iron);
+    task->identification = robust_identification(drive, &out, snapshot->sample.point.omega);
     task->psi_d_error = task->identification.psi_d_error;
 }
 

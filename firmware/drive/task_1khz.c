@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "control/torque/iron_loss.h"
 #include "drive/data_check.h"
 #include "drive/drive.h"
 #include "drive/excess_torque.h"
+#include "drive/iron_current.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/safe_decision.h"
 #include "drive/slow_monitors.h"
@@ -89,8 +89,7 @@ static q15_t limit_torque(drive_t *drive, const snapshot_t *snapshot)
         .winding_dC = snapshot->winding_dC,
     };
     task->allowed = torque_limit_step(&drive->motor->torque_limit, &task->torque_limit, &in);
-    const uint32_t magnet = task->reference.i_d_limited ? DERATING_MAGNET : 0U;
-    task->derating = (uint16_t)(task->allowed.derating | magnet);
+    task->derating = (uint16_t)(task->allowed.derating | (task->reference.i_d_limited ? DERATING_MAGNET : 0U));
     return task->allowed.torque_limited;
 }
 
@@ -121,18 +120,6 @@ static q15_t psi_q_delta(const drive_t *drive)
     return fx_mul_q15(fx_q15_from_q31(drive->task.identification.lq_error), fx_abs_q15(drive->task.psi_ref.q));
 }
 
-/* The references are those of the magnetising current. */
-static dq_q15_t with_iron_loss(const drive_t *drive, dq_q15_t i_ref)
-{
-    const task_state_t *task = &drive->task;
-    const iron_loss_in_t in = {
-        .admittance = task->identification.iron_admittance,
-        .psi = {task->psi_ref.d + task->identification.psi_d_error, task->psi_ref.q},
-        .i_max = drive->motor->current_reference.i_max,
-    };
-    return iron_loss_add(&in, i_ref);
-}
-
 static dq_q15_t compute_references(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
@@ -149,7 +136,7 @@ static dq_q15_t compute_references(drive_t *drive, const snapshot_t *snapshot)
         .psi_q_delta = psi_q_delta(drive),
     };
     task->reference = current_reference_step(&drive->motor->current_reference, &in);
-    task->reference.i_ref = with_iron_loss(drive, task->reference.i_ref);
+    task->reference.i_ref = drive_add_iron_current(drive, task->reference.i_ref);
     if (commission_runs(&task->commission)) {
         return task->commission.i_ref;
     }

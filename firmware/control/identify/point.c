@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/identify/point.h"
 
+#include "control/identify/iron.h"
 #include "fx/codegen.h"
 
 /* Q15 * Q32 = Q47 -> Q31; |twice_sum| < 2^22. Not inlined, here and below: two calls take less memory than two
@@ -38,20 +39,13 @@ static q31_t mean_speed(const identify_config_t *config, uint32_t angle_change, 
     return fx_add_q31(tracked, fx_mul_gain_q31(config->turn_to_pu, (int32_t)(angle_change - expected)));
 }
 
-/* a in q31. The hysteresis term changes its sign gradually through zero speed (ID-4). */
-static q31_t iron_admittance(const identify_config_t *config, q31_t omega)
-{
-    const q31_t sign = fx_mul_gain_q31(config->iron_sign_gain, omega);
-    return fx_add_q31(fx_mul_q31(config->iron_hysteresis, sign), fx_mul_q31(config->iron_eddy, omega));
-}
-
 identify_point_t identify_point(const identify_config_t *config, const identify_window_t *window, q31_t omega_tracked)
 {
     const identify_end_t *a = &window->first;
     const identify_end_t *b = &window->last;
     const q31_t omega = mean_speed(config, b->theta - a->theta, omega_tracked);
     const q31_t sinc = fx_mulhi(2 * config->sinc_gain, fx_mul_q31(omega, omega));
-    const q31_t iron = iron_admittance(config, omega);
+    const q31_t iron = identify_iron_admittance(config, omega);
     const dq_q31_t i = {trapezoid(config, window->sum_i.d, a->i.d, b->i.d),
                         trapezoid(config, window->sum_i.q, a->i.q, b->i.q)};
     const q15_t speed = fx_abs_q15(fx_q15_from_q31(omega));

@@ -3,7 +3,6 @@
 
 #include <stddef.h>
 
-#include "control/torque/current_circle.h"
 #include "fx/codegen.h"
 #include "fx/div.h"
 #include "fx/q.h"
@@ -42,6 +41,16 @@ static FX_NOT_INLINED int32_t planned_flux(const current_reference_config_t *con
     const int32_t drop = 2 * fx_mulhi((int32_t)config->r_q16 * speed, driving * 65536);
     const int32_t flux = fx_root((uint32_t)fx_max_s32(v_plan * v_plan - drop, 0)) * 32768 / speed;
     return flux - in->shift;
+}
+
+/* Interpolation between table nodes may slightly exceed the current circle: i_d is kept and i_q reduced (CR-7). */
+static dq_q15_t limit_to_current_circle(dq_q15_t i, q15_t i_max)
+{
+    const int32_t i_q_squared_max = fx_mul_q30(i_max, i_max) - fx_mul_q30((q15_t)i.d, (q15_t)i.d);
+    if (fx_mul_q30((q15_t)i.q, (q15_t)i.q) <= i_q_squared_max) {
+        return i;
+    }
+    return (dq_q15_t){fx_max_s32(i.d, -i_max), fx_root((uint32_t)fx_max_s32(i_q_squared_max, 0))};
 }
 
 static FX_NOT_INLINED dq_q15_t currents_from_table(const current_reference_config_t *config, int32_t torque,
@@ -88,8 +97,7 @@ current_reference_t current_reference_step(const current_reference_config_t *con
     const int32_t requested = fx_abs_q15(in->torque_corrected);
     const q15_t psi = (q15_t)fx_usat_q15_word(planned_flux(config, in, requested));
     const int32_t torque = fx_min_s32(requested, torque_max);
-    /* interpolation between nodes may slightly exceed the circle */
-    dq_q15_t i_ref = current_circle_limit(currents_from_table(config, torque, psi), config->i_max);
+    dq_q15_t i_ref = limit_to_current_circle(currents_from_table(config, torque, psi), config->i_max);
     const bool i_d_limited = i_ref.d < -in->i_d_max;
     i_ref.d = fx_max_s32(i_ref.d, -in->i_d_max); /* (CR-11) */
     i_ref.q = (in->torque_corrected < 0) ? -i_ref.q : i_ref.q;

@@ -44,7 +44,7 @@ typedef struct {
 } current_reference_in_t;
 
 typedef struct {
-    dq_q15_t i_ref;     /* of the magnetising current */
+    dq_q15_t i_ref;
     q15_t torque_max;   /* largest torque of the machine as identified */
     q15_t torque_limit; /* follows torque_max, whose resistive drop reduces it */
     q15_t psi_plan;     /* planned flux: second input of the table */

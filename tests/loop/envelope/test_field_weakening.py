@@ -24,9 +24,9 @@ def test_a_request_of_zero_at_high_speed_makes_no_torque(
     rig.run(0.1)  # until then the diodes of the disabled bridge rectify and brake
     trace = rig.run(0.4)
     assert trace.faults == 0
-    # The references contain the current of the iron loss, which would brake with up to 1.2 N·m; the torque loop does not
-    # correct a request of zero.
-    assert abs(trace.settled()) <= 0.3
+    # The iron loss would brake with up to 1.2 N·m: the torque loop does not correct a request of zero. The references
+    # contain the current of the loss, but for a part that fades out near zero current.
+    assert abs(trace.settled()) <= 0.8
     assert np.abs(trace.torque).max() <= 1.5  # in every period
 
 

@@ -155,17 +155,8 @@ static void robust(twin_t *twin)
     twin_identify(&twin->motor, &twin->identify, &point, twin->winding_C,
                   twin->identification && (twin->periods_on >= 3));
     twin->torque_estimated = twin->identify.torque;
-    twin->iron_admittance = point.iron * (1.0 + twin->identify.kalman.x[6] * twin->motor.identify_sigma[6]);
-}
-
-/* (CR-18) */
-static twin_dq_t with_iron_loss(const twin_t *twin, twin_dq_t i)
-{
-    const double i_max = twin->motor.i_max_A;
-    const double d = fmax(i.d - twin->iron_admittance * twin->psi_ref.q, -i_max);
-    const double q = i.q + twin->iron_admittance * (twin->psi_ref.d + twin->psi_delta);
-    const double q_max = sqrt(i_max * i_max - d * d);
-    return (twin_dq_t){d, twin_clamp(q, -q_max, q_max)};
+    const double scale = twin->identify.kalman.x[6] * twin->motor.identify_sigma[6] * twin->identify.confidence;
+    twin->iron_admittance = twin_iron_admittance(&twin->motor, twin->sample.omega) * (1.0 + scale);
 }
 
 static void task(twin_t *twin)
@@ -180,7 +171,8 @@ static void task(twin_t *twin)
     }
     if (twin->run_state == TWIN_RUN) {
         torque_path(twin);
-        twin->reference.i_ref = with_iron_loss(twin, twin->reference.i_ref);
+        const twin_dq_t psi = {twin->psi_ref.d + twin->psi_delta, twin->psi_ref.q};
+        twin->reference.i_ref = twin_iron_loss(&twin->motor, twin->reference.i_ref, twin->iron_admittance, psi);
         twin->i_ref = twin->current_mode ? (twin_dq_t){twin->id_command, twin->iq_command} : twin->reference.i_ref;
         twin->target = twin_current_target(&twin->motor, twin->i_ref, twin->sample.omega, twin->psi_delta,
                                            &twin->rotating);

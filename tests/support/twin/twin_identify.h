@@ -31,6 +31,8 @@ typedef struct {
     bool valid;
 } twin_point_t;
 
+/* A/Vs (ID-4). */
+double twin_iron_admittance(const motor_si_t *motor, double omega);
 twin_point_t twin_point(const motor_si_t *motor, const twin_window_t *window, double omega_tracked);
 
 typedef struct {

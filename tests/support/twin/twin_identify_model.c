@@ -26,6 +26,12 @@ static double trapezoid(double sum, double first, double last, int n)
     return (sum - 0.5 * last + 0.5 * first) / n;
 }
 
+double twin_iron_admittance(const motor_si_t *motor, double omega)
+{
+    const double sign = twin_clamp(omega / motor->iron_sign_rad_s, -1.0, 1.0);
+    return (motor->iron_hysteresis * sign + motor->iron_eddy * omega) / 1.5;
+}
+
 twin_point_t twin_point(const motor_si_t *motor, const twin_window_t *window, double omega_tracked)
 {
     const int n = motor->periods_per_step;
@@ -35,8 +41,7 @@ twin_point_t twin_point(const motor_si_t *motor, const twin_window_t *window, do
     const double turned = remainder(b->theta - a->theta - omega_tracked * time, two_pi);
     const double w = omega_tracked + turned / time;
     const double sinc = pow(w * motor->period_s, 2.0) / 24.0;
-    const double sign = twin_clamp(w / motor->iron_sign_rad_s, -1.0, 1.0);
-    const double iron = (motor->iron_hysteresis * sign + motor->iron_eddy * w) / 1.5;
+    const double iron = twin_iron_admittance(motor, w);
     const twin_dq_t i = {trapezoid(window->sum_i.d, a->i.d, b->i.d, n), trapezoid(window->sum_i.q, a->i.q, b->i.q, n)};
     const double u_gain = (1.0 + sinc) / n;
     const double rate_gain = (1.0 - 2.0 * sinc) / time;

@@ -228,4 +228,7 @@ double twin_voltage_reserve(const motor_si_t *motor, double *trim, const twin_re
 
 twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_reference_in_t *in);
 
+/* i_m: magnetising current; admittance in A/Vs (CR-18), (CR-19). */
+twin_dq_t twin_iron_loss(const motor_si_t *motor, twin_dq_t i_m, double admittance, twin_dq_t psi);
+
 #endif

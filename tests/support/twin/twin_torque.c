@@ -86,6 +86,20 @@ twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_refe
     };
 }
 
+twin_dq_t twin_iron_loss(const motor_si_t *motor, twin_dq_t i_m, double admittance, twin_dq_t psi)
+{
+    const double i_max = motor->i_max_A;
+    const double flowing = fmin(16.0 * (fabs(i_m.d) + fabs(i_m.q)) / i_max, 1.0);
+    const twin_dq_t iron = {-admittance * flowing * psi.q, admittance * flowing * psi.d};
+    const double length = hypot(i_m.d + iron.d, i_m.q + iron.q);
+    const double length_m = hypot(i_m.d, i_m.q);
+    double share = 1.0;
+    if (length > i_max) {
+        share = fmax(i_max * i_max - length_m * length_m, 0.0) / (length * length - length_m * length_m);
+    }
+    return (twin_dq_t){i_m.d + share * iron.d, i_m.q + share * iron.q};
+}
+
 double twin_voltage_reserve(const motor_si_t *motor, double *trim, const twin_reserve_in_t *in)
 {
     const double psi = hypot(in->psi.d, in->psi.q);

@@ -4,8 +4,8 @@
  * the task is: small, but for what is in fast_sources.txt, which is called, not compiled in. */
 #include <string.h>
 
-#include "control/torque/iron_loss.h"
 #include "drive/drive.h"
+#include "drive/iron_current.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/slow_monitors.h"
 #include "drive/step_mean.h"
@@ -217,12 +217,7 @@ CALLED void task_reference(void)
         .psi_q_delta = 0,
     };
     d->task.reference = current_reference_step(&d->motor->current_reference, &in);
-    const iron_loss_in_t iron = {
-        .admittance = d->task.identification.iron_admittance,
-        .psi = {d->task.psi_ref.d + d->task.identification.psi_d_error, d->task.psi_ref.q},
-        .i_max = d->motor->current_reference.i_max,
-    };
-    d->task.reference.i_ref = iron_loss_add(&iron, d->task.reference.i_ref);
+    d->task.reference.i_ref = drive_add_iron_current(d, d->task.reference.i_ref);
 }
 
 CALLED void task_target(void)

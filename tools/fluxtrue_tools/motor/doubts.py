@@ -35,6 +35,7 @@ RUN_UP_MOST_S, RUN_UP_LEAST_S = 200.0, 2e-4  # to top speed with all torque
 OFFSET_MAX = 0.05  # of the largest psi_q
 CURL_MAX = 0.05  # of the mean inductance
 STEP_MAX = 0.05  # of the largest flux linkage; the measured map of hsm1 has 0.017
+IRON_MAX = 0.05  # of torque_max_Nm: the current references supply it, and the second level tolerates 6 % (SL-6)
 DEMAGNETISATION_MIN = 0.05  # of i_max, at the assumed temperature: less hardly weakens a field
 
 
@@ -122,6 +123,21 @@ def _magnets(config: MotorConfig) -> Iterator[Doubt]:
                     f"{config.magnet.i_d_demag_A_per_K:g} A/K: magnets at {celsius:g} °C withstand {left_A:.3g} A "
                     f"of i_d, {100 * left_A / i_max_A:.2g} % of i_max_A (allowed without a warning: "
                     f"{100 * DEMAGNETISATION_MIN:g} %): the field can hardly be weakened")  # fmt: skip
+
+
+def _iron(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
+    """The torque p (k_h + k_e w) |psi|^2 of the loss is largest where the whole flux just fits the voltage."""
+    machine = config.machine
+    whole = float(np.hypot(model.psi_d(0.0, machine.i_max_A), model.psi_q(0.0, machine.i_max_A)))
+    omega = min(_reach_V(config) / whole, config.omega_max_rad_s)
+    torque_Nm = machine.pole_pairs * (machine.iron_loss_hysteresis + machine.iron_loss_eddy * omega) * whole**2
+    share = torque_Nm / machine.torque_max_Nm
+    if share > IRON_MAX:
+        rpm = omega / machine.pole_pairs * 30.0 / math.pi
+        yield Doubt(f"machine.iron_loss_hysteresis = {machine.iron_loss_hysteresis:g}, iron_loss_eddy = "
+                    f"{machine.iron_loss_eddy:g}: at {rpm:.4g} rpm the iron takes {torque_Nm:.3g} N·m, "
+                    f"{100 * share:.2g} % of torque_max_Nm (allowed without a warning: {100 * IRON_MAX:g} %), "
+                    "which the current references supply")  # fmt: skip
 
 
 def _no_effect(config: MotorConfig) -> Iterator[Doubt]:
@@ -217,5 +233,5 @@ def of_motor(motor: "Motor") -> list[str]:
     config = motor.config
     found = [*_units(config, motor.model), *_values(config), *_torque(motor),
              *_dead_time(config, motor.model), *_magnets(config), *_map(config, motor.flux_map, motor.model),
-             *_accuracy(motor), *_no_effect(config)]  # fmt: skip
+             *_accuracy(motor), *_iron(config, motor.model), *_no_effect(config)]  # fmt: skip
     return [doubt.text for doubt in found]
