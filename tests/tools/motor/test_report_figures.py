@@ -42,7 +42,9 @@ def test_the_envelope_has_both_quadrants_with_and_without_the_limits_of_generati
     lines = {line.get_label(): np.asarray(line.get_ydata()) for line in figure.axes[0].lines}
     driving = lines["also limited by torque_max_Nm"]
     assert driving.max() == pytest.approx(132.0) and driving.min() > 0.0
-    assert any(np.array_equal(values, -driving) for values in lines.values())
+    # Braking, the drop adds to the voltage: less at no speed, 3 N·m more at 10,000 rpm.
+    braking = [values for values in lines.values() if values.min() == pytest.approx(-132.0) and values[-1] < -66.0]
+    assert any(values.shape == driving.shape and np.all(-values >= driving) for values in braking)
     limited = [values for name, values in lines.items() if "generating, battery takes at most" in str(name)]
     assert len(limited) == 2
     for values in limited:  # all torque where the machine is slow, less at speed

@@ -14,7 +14,7 @@ from fluxtrue_tools.motor.derived import (
     TURNING_FEEDBACK,
     TURNING_INTEGRAL,
 )
-from fluxtrue_tools.motor.envelope import available_flux
+from fluxtrue_tools.motor.envelope import available_flux, torque_envelope
 from fluxtrue_tools.motor.flux_model import Array
 from fluxtrue_tools.motor.motor import Motor
 
@@ -91,7 +91,8 @@ def operating_point(motor: Motor, speed_rpm: float, inductance: float = 1.0) -> 
 
     Smaller inductances weaken the field less: they take more i_d for it.
     """
-    psi = POINT_FLUX * float(available_flux(motor, np.array([speed_rpm]))[0])
+    speed = np.array([speed_rpm])
+    psi = POINT_FLUX * float(available_flux(motor, speed, POINT_TORQUE * torque_envelope(motor, speed), np.zeros(1))[0])
     possible = min(float(motor.limits.torque_max(np.array([psi]))[0]), motor.config.machine.torque_max_Nm)
     (contour,) = motor.solver.contours(np.array([POINT_TORQUE * max(possible, 0.0)]))
     i_d, i_q = (float(x[0]) for x in contour.at(np.array([psi])))

@@ -15,8 +15,8 @@ from matplotlib.ticker import MaxNLocator
 
 from fluxtrue_tools.motor.config import MotorConfig
 from fluxtrue_tools.motor.demagnetisation import COLD_C, hottest_C, limit_A, withstands_C
-from fluxtrue_tools.motor.envelope import available_flux
-from fluxtrue_tools.motor.flux_model import Array, flux, torque
+from fluxtrue_tools.motor.envelope import voltage_speed
+from fluxtrue_tools.motor.flux_model import Array, torque
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.quantise import Q15_ONE
 from fluxtrue_tools.motor.references import Contour, lookup_references
@@ -54,17 +54,18 @@ def round_speeds(low: float, high: float, apart: float) -> Array:
     return np.array([*ticks[(ticks >= low) & (ticks <= high - apart)], high])
 
 
-def _voltage_limits(axes: Axes, motor: Motor, d: Array, q: Array, psi: Array) -> None:
+def _voltage_limits(axes: Axes, motor: Motor, d: Array, q: Array, inside: Array) -> None:
     """Where the machine needs all of the planned voltage, at some speeds between the first that matters and the top."""
     top_rpm = motor.config.machine.speed_max_rpm
+    limit = np.where(inside, voltage_speed(motor, d, q), np.nan)
     speed = np.linspace(0.0, top_rpm, 401)[1:]
-    available = available_flux(motor, speed)
-    matters = speed[(available < np.nanmax(psi)) & (available > np.nanmin(psi))]
+    matters = speed[(speed > np.nanmin(limit)) & (speed < np.nanmax(limit))]
     if len(matters) == 0:
         return
     shown = round_speeds(matters[0], matters[-1], SPEEDS_APART * top_rpm)
-    level = available_flux(motor, shown)
-    lines = axes.contour(d, q, psi, levels=np.sort(level), colors="tab:blue", linewidths=0.8)
+    # The reciprocal is finite where the flux vanishes.
+    level = 1.0 / shown
+    lines = axes.contour(d, q, 1.0 / np.maximum(limit, 1e-9), levels=np.sort(level), colors="tab:blue", linewidths=0.8)
     named = {float(x): f"{rpm:.0f} rpm" for x, rpm in zip(level, shown, strict=True)}
     _label(axes, lines, named)
     axes.plot([], [], color="tab:blue", linewidth=0.8, label=f"voltage limit at a speed, up to {top_rpm:g} rpm")
@@ -84,7 +85,7 @@ def loci_figure(motor: Motor) -> Figure:
     d, q = current_plane(motor, False)
     inside = np.hypot(d, q) <= motor.config.machine.i_max_A
     _torques(axes, motor, d, q, inside)
-    _voltage_limits(axes, motor, d, q, np.where(inside, flux(motor.model, d, q), np.nan))
+    _voltage_limits(axes, motor, d, q, inside)
     angle = np.linspace(np.pi / 2, np.pi, 100)
     i_max = motor.config.machine.i_max_A
     axes.plot(i_max * np.cos(angle), i_max * np.sin(angle), "k", label="current limit i_max_A")

@@ -206,6 +206,7 @@ class Limits:
     torque_Nm: Array
     psi_min_Vs: Array
     psi_mtpa_Vs: Array
+    current_end_A: Array  # at psi_min_Vs
 
     def torque_max(self, psi_Vs: Array) -> Array:
         psi, first = np.unique(self.psi_min_Vs, return_index=True)
@@ -219,7 +220,8 @@ def limits_of(solver: Solver) -> Limits:
     torques[-1] = solver.torque_top_Nm * (1 - 1e-6)
     contours = solver.contours(torques)
     psi_min = np.maximum.accumulate([c.psi_Vs[-1] for c in contours])
-    return Limits(torques, psi_min, np.array([c.psi_Vs[0] for c in contours]))
+    current_end = np.array([np.hypot(c.id_A[-1], c.iq_A[-1]) for c in contours])
+    return Limits(torques, psi_min, np.array([c.psi_Vs[0] for c in contours]), current_end)
 
 
 PRIOR_WEIGHT = 0.02

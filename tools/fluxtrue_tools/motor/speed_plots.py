@@ -34,7 +34,7 @@ def _allowed(torque_Nm: Array, fed_W: Array, limit_W: float) -> float:
 
 def _generating_limits(axes: Axes, motor: Motor) -> None:
     """What remains of the generating torque if the battery takes only a share of the largest power, (LM-3)."""
-    found = losses(motor)
+    found = losses(motor, brakes=True)
     shaft_W = found.torque_Nm[:, None] * found.speed_rpm[None, :] * 2 * np.pi / 60
     fed_W = shaft_W - found.total_W
     largest_W = float(np.nanmax(fed_W))
@@ -52,12 +52,13 @@ def envelope_figure(motor: Motor) -> Figure:
     machine = motor.config.machine
     figure, axes = plt.subplots(figsize=(9, 5.5), layout="constrained")
     speed = np.linspace(0, machine.speed_max_rpm, 300)
-    possible = torque_envelope(motor, speed)
-    limited = np.minimum(possible, machine.torque_max_Nm)
     power = axes.twinx()
-    watts, unit = power_unit(float(np.max(limited * speed)) * 2 * np.pi / 60)
-    for sign in (1.0, -1.0):
+    driving, braking = (torque_envelope(motor, speed, brakes) for brakes in (False, True))
+    largest_W = float(np.max(np.minimum(braking, machine.torque_max_Nm) * speed)) * 2 * np.pi / 60
+    watts, unit = power_unit(largest_W)
+    for sign, possible in ((1.0, driving), (-1.0, braking)):
         named = sign > 0
+        limited = np.minimum(possible, machine.torque_max_Nm)
         axes.plot(speed, sign * possible, "tab:gray", ls=":", label="limited by current and voltage" if named else None)
         axes.plot(speed, sign * limited, "tab:green", lw=2, label="also limited by torque_max_Nm" if named else None)
         shaft_W = sign * limited * speed * 2 * np.pi / 60
