@@ -87,4 +87,5 @@ def test_the_envelope_at_top_speed_is_what_the_firmware_reaches(tmp_path: Path, 
         assert loop.get("fault_word") == 0.0
         loop.record(("truth.torque_mean_Nm",), 1)
         reached = sign * loop.run(2000).mean()
-    assert reached == pytest.approx(possible, rel=0.01)
+    # 1 % of the interpolated tables; the plan of the firmware has no R² |i|², and its trim follows within 0.5 %.
+    assert reached == pytest.approx(possible, rel=0.015)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Torque over speed in the steady state, where the trim holds the voltage at the planned one: (CR-17), (CR-19).
+"""Torque over speed in the steady state, where the trim holds the voltage at the planned one: (CR-17), (CR-20).
 
 Source   docs/theory/current-reference.md
 Units    rpm >= 0, N·m, positive where it drives; windings at 20 °C
@@ -44,7 +44,7 @@ def available_flux(motor: Motor, speed_rpm: Array, torque_Nm: Array, current_A: 
 
 
 def torque_envelope(motor: Motor, speed_rpm: Array, brakes: bool = False) -> Array:
-    """Magnitude of the largest torque at each speed (CR-19), before torque_max_Nm cuts it; zero where none is possible.
+    """Magnitude of the largest torque at each speed (CR-20), before torque_max_Nm cuts it; zero where none is possible.
 
     Found where the flux that a torque leaves falls below the least one of its contour, from zero torque on.
     """
