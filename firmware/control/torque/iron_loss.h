@@ -53,7 +53,7 @@ static inline dq_q15_t iron_loss_add(const iron_loss_in_t *in, dq_q15_t i_m)
         return i;
     }
     const int64_t square_m = iron_loss_square(i_m);
-    const int32_t left = (int32_t)fx_max_s32(allowed - (int32_t)square_m, 0);
+    const int32_t left = fx_max_s32(allowed - (int32_t)square_m, 0);
     /* Q30/Q18 = Q12, below 1 because square > allowed */
     const int32_t share = left / (int32_t)(((square - square_m) >> 12) + 1);
     return (dq_q15_t){i_m.d + (share * iron.d >> 12), i_m.q + (share * iron.q >> 12)};
