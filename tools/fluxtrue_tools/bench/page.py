@@ -60,7 +60,7 @@ TASK_CONTAINS = {
     "temperatures allow",
     "torque_loop": "slew, one step of the torque loop",
     "reference": "from torque, speed and dc voltage to i_d and i_q (MTPA, field weakening), with the voltage that the "
-    "limiter has left and the demagnetisation limit",
+    "limiter has left and the demagnetisation limit, plus the current of the iron loss",
     "target": "flux tables at the reference, set point of the current control, hand-over",
     "safe_state": "which safe state a fault would need now",
     "schedule": "gains and gates of the paper's identification, hand-over; with the paper's identification only",
