@@ -51,7 +51,15 @@ class Analysis:
     @property
     def options(self) -> list[str]:
         """The options of Cppcheck."""
-        return [*OPTIONS, *(f"-I{path}" for path in self.include), *(f"-D{macro}" for macro in self.macros)]
+        return [*OPTIONS, *(f"-I{self.short(path)}" for path in self.include), *(f"-D{macro}" for macro in self.macros)]
+
+    def short(self, path: Path) -> str:
+        """Relative to the root where the path lies below it.
+
+        In what order Cppcheck lists the variables of a file depends on its path: with absolute paths a member of
+        integrity.c was reported (rule 5.8) in some places of the checkout and not in others.
+        """
+        return str(path.relative_to(self.root)) if path.is_relative_to(self.root) else str(path)
 
 
 def installed() -> Path:
@@ -87,9 +95,9 @@ def needed(analysis: Analysis, path: Path, seen: set[Path]) -> set[Path]:
 
 def digest(analysis: Analysis, path: Path) -> str:
     """What the findings in the file depend on."""
-    seen = hashlib.sha256("\0".join((version("cppcheck"), *analysis.options, str(path))).encode())
+    seen = hashlib.sha256("\0".join((version("cppcheck"), *analysis.options, analysis.short(path))).encode())
     for each in (Path(__file__), *sorted(needed(analysis, path, set()))):
-        seen.update(f"\0{each}\0".encode() + each.read_bytes())
+        seen.update(f"\0{analysis.short(each)}\0".encode() + each.read_bytes())
     return seen.hexdigest()
 
 
@@ -107,7 +115,7 @@ def one_file(analysis: Analysis, path: Path) -> tuple[list[Finding], str]:
     """What the add-on finds in a file, and what it notes of it for the rules that span files."""
     with tempfile.TemporaryDirectory(prefix="misra-") as work:
         command = [str(installed() / "cppcheck"), *analysis.options, TEMPLATE]
-        command += [f"--addon-python={sys.executable}", f"--cppcheck-build-dir={work}", str(path)]
+        command += [f"--addon-python={sys.executable}", f"--cppcheck-build-dir={work}", analysis.short(path)]
         done = subprocess.run(command, cwd=analysis.root, capture_output=True, text=True, check=False)
         notes = list(Path(work).glob("*.ctu-info"))
         if done.returncode or len(notes) != 1:
@@ -156,8 +164,4 @@ def analyse(analysis: Analysis, paths: Sequence[Path], spanning: bool) -> set[Fi
     if spanning:
         found.update(between_files(analysis, [notes for _, notes in each]))
 
-    def short(name: str) -> str:
-        path = Path(os.path.normpath(root / name))
-        return str(path.relative_to(root)) if path.is_relative_to(root) else str(path)
-
-    return {one._replace(path=short(one.path)) for one in found}
+    return {one._replace(path=analysis.short(Path(os.path.normpath(root / one.path)))) for one in found}

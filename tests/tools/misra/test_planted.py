@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "tools" / "checks"))
 from misra_deviations import Rules, read, rule_key  # noqa: E402
-from misra_run import Analysis, analyse, implemented  # noqa: E402
+from misra_run import Analysis, analyse, digest, implemented  # noqa: E402
 
 PLANTED = Path(__file__).with_name("planted")
 MARK = re.compile(r"/\* (?:.* )?rules? (\d+\.\d+(?:, \d+\.\d+)*) \*/")
@@ -48,3 +48,14 @@ def test_every_planted_violation_is_found_at_its_line(tmp_path: Path) -> None:
     shutil.copytree(PLANTED, folder)
     found = analyse(Analysis(tmp_path, (folder,), ("PLANTED=1",), 1), sorted(folder.glob("*.c")), True)
     assert marked() - {(Path(one.path).name, one.line, one.rule) for one in found} == set()
+
+
+def test_the_findings_do_not_depend_on_where_the_checkout_is(tmp_path: Path) -> None:
+    seen = set()
+    for place in ("here", "a/longer/place"):
+        folder = tmp_path / place / "planted"
+        shutil.copytree(PLANTED, folder)
+        analysis = Analysis(tmp_path / place, (folder,), ("PLANTED=1",), 1)
+        assert str(tmp_path) not in " ".join(analysis.options)
+        seen.add(digest(analysis, sorted(folder.glob("*.c"))[0]))
+    assert len(seen) == 1
