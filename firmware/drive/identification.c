@@ -15,12 +15,21 @@ static q15_t variance_reduction(const identify_state_t *state, identify_index_t 
     return (q15_t)fx_max_s32(Q15_MAX - (state->kalman.p_q30[kalman_p_index(index, index)] >> 15), 0);
 }
 
+/* Q31: 0 up to w_min, 1 from 2 w_min on. A reference that changes while the rotor begins to turn would hide a wrong
+ * angle from safety/launch_power.h, which compares the power at one reference. */
+static q31_t share_of_speed(const identify_config_t *config, q31_t omega)
+{
+    const int32_t above = fx_abs_q15(fx_q15_from_q31(omega)) - config->omega_min;
+    const int32_t share = fx_clamp_q31(above, 0, config->omega_min) * 32768 / config->omega_min;
+    return fx_min_s32(share, Q15_MAX) * 65536;
+}
+
 /* a of (CR-18) at the tracked speed: that of a window may be wrong when the window is not valid. The identified scale
  * of the loss counts as far as the estimate is trusted. */
 static q31_t iron_admittance(const drive_t *drive, q31_t omega, q15_t confidence)
 {
     const identify_config_t *config = &drive->motor->identify;
-    const q31_t nominal = identify_iron_admittance(config, omega);
+    const q31_t nominal = fx_mul_q31(identify_iron_admittance(config, omega), share_of_speed(config, omega));
     const q31_t scale = identify_value(config, &drive->task.identify, IDENTIFY_IRON);
     return fx_add_q31(nominal, fx_mul_q31(nominal, fx_mul_q31(scale, fx_q31_from_q15(confidence))));
 }

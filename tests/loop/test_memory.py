@@ -70,8 +70,8 @@ def without_loop(motor: Motor) -> float:
 def test_with_the_memory_the_first_torque_is_right(hsm1: Motor, memory: bytes) -> None:
     kept = error_after_enabling(hsm1, memory)
     print(f"tables {without_loop(hsm1):.2f} %, first start {error_after_enabling(hsm1, None):.2f} %, kept {kept:.2f} %")
-    # The magnet is 12 % weak and makes about two thirds of the torque.
-    assert without_loop(hsm1) < -6.0
+    # The magnet is 12 % weak and makes about two thirds of the torque; the iron is supplied.
+    assert without_loop(hsm1) < -5.0
     assert abs(kept) <= 1.0
 
 

@@ -156,7 +156,9 @@ static void robust(twin_t *twin)
                   twin->identification && (twin->periods_on >= 3));
     twin->torque_estimated = twin->identify.torque;
     const double scale = twin->identify.kalman.x[6] * twin->motor.identify_sigma[6] * twin->identify.confidence;
-    twin->iron_admittance = twin_iron_admittance(&twin->motor, twin->sample.omega) * (1.0 + scale);
+    const double above = fabs(twin->sample.omega) / twin->motor.identify_omega_min_rad_s - 1.0;
+    const double nominal = twin_iron_admittance(&twin->motor, twin->sample.omega) * twin_clamp(above, 0.0, 1.0);
+    twin->iron_admittance = nominal * (1.0 + scale);
 }
 
 static void task(twin_t *twin)

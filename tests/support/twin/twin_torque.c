@@ -95,7 +95,8 @@ twin_dq_t twin_iron_loss(const motor_si_t *motor, twin_dq_t i_m, double admittan
     const double length_m = hypot(i_m.d, i_m.q);
     double share = 1.0;
     if (length > i_max) {
-        share = fmax(i_max * i_max - length_m * length_m, 0.0) / (length * length - length_m * length_m);
+        const double more = length * length - length_m * length_m;
+        share = (more > 0.0) ? fmax(i_max * i_max - length_m * length_m, 0.0) / more : 0.0;
     }
     return (twin_dq_t){i_m.d + share * iron.d, i_m.q + share * iron.q};
 }
