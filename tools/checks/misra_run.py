@@ -56,8 +56,8 @@ class Analysis:
     def short(self, path: Path) -> str:
         """Relative to the root where the path lies below it.
 
-        In what order Cppcheck lists the variables of a file depends on its path: with absolute paths a member of
-        integrity.c was reported (rule 5.8) in some places of the checkout and not in others.
+        What Cppcheck notes of a file depends on the path by which it is named: with absolute paths a member of a
+        structure was reported (rule 5.8) in one place of the checkout and not in another.
         """
         return str(path.relative_to(self.root)) if path.is_relative_to(self.root) else str(path)
 

@@ -16,7 +16,7 @@ from fluxtrue_tools.motor.bases import inductance_at_rest
 from fluxtrue_tools.motor.config import MotorConfig
 from fluxtrue_tools.motor.demagnetisation import limit_A
 from fluxtrue_tools.motor.flux_map import FluxMap
-from fluxtrue_tools.motor.flux_model import FluxModel
+from fluxtrue_tools.motor.flux_model import FluxModel, flux
 from fluxtrue_tools.motor.flux_tables import ERROR_WANTED as TABLE_WANTED
 from fluxtrue_tools.motor.references import ERROR_WANTED, ERROR_WANTED_WEAK
 
@@ -35,7 +35,7 @@ RUN_UP_MOST_S, RUN_UP_LEAST_S = 200.0, 2e-4  # to top speed with all torque
 OFFSET_MAX = 0.05  # of the largest psi_q
 CURL_MAX = 0.05  # of the mean inductance
 STEP_MAX = 0.05  # of the largest flux linkage; the measured map of hsm1 has 0.017
-IRON_MAX = 0.05  # of torque_max_Nm: the current references supply it, and the second level tolerates 6 % (SL-6)
+IRON_MAX = 0.05  # of torque_max_Nm: the current references supply it; the second level tolerates 3 to 6 % (SL-6)
 DEMAGNETISATION_MIN = 0.05  # of i_max, at the assumed temperature: less hardly weakens a field
 
 
@@ -49,6 +49,11 @@ class Doubt:
 
 def _reach_V(config: MotorConfig) -> float:
     return config.inverter.vdc_V / math.sqrt(3.0)
+
+
+def _whole_flux(config: MotorConfig, model: FluxModel) -> float:
+    """Of the largest current along q, V·s."""
+    return float(flux(model, 0.0, config.machine.i_max_A))
 
 
 def _flux_key(config: MotorConfig, value: float) -> str:
@@ -68,7 +73,7 @@ def _units(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
         key = "machine.lq_H" if machine.flux_map is None else f"{machine.flux_map}: psi_q_Vs"
         yield Doubt(f"{key}: i_max_A makes {psi_q / psi_f:.0f} times the magnet's flux in the q axis, as if an "
                     "inductance were in mH; wanted: H, V·s and A", True)  # fmt: skip
-    whole = float(np.hypot(model.psi_d(0.0, machine.i_max_A), psi_q))
+    whole = _whole_flux(config, model)
     used = config.omega_max_rad_s * whole / _reach_V(config)
     if used < EMF_MIN or (used < 1.0 and emf < EMF_MAGNET_MIN):
         rad_s = machine.speed_max_rpm * 60.0 / (2.0 * math.pi)
@@ -128,7 +133,7 @@ def _magnets(config: MotorConfig) -> Iterator[Doubt]:
 def _iron(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
     """The torque p (k_h + k_e w) |psi|^2 of the loss is largest where the whole flux just fits the voltage."""
     machine = config.machine
-    whole = float(np.hypot(model.psi_d(0.0, machine.i_max_A), model.psi_q(0.0, machine.i_max_A)))
+    whole = _whole_flux(config, model)
     omega = min(_reach_V(config) / whole, config.omega_max_rad_s)
     torque_Nm = machine.pole_pairs * (machine.iron_loss_hysteresis + machine.iron_loss_eddy * omega) * whole**2
     share = torque_Nm / machine.torque_max_Nm

@@ -29,7 +29,7 @@ def _circle_V(motor: Motor) -> float:
     return motor.config.inverter.vdc_V / math.sqrt(3.0)
 
 
-def _drop_V(motor: Motor, torque_Nm: Array) -> Array:
+def _half_drop(motor: Motor, torque_Nm: Array) -> Array:
     """R T/(1.5 p), V² per rad/s: half of the middle term of (CR-17) over the speed."""
     machine = motor.config.machine
     return machine.r_ohm * np.asarray(torque_Nm) / (1.5 * machine.pole_pairs)
@@ -38,7 +38,7 @@ def _drop_V(motor: Motor, torque_Nm: Array) -> Array:
 def available_flux(motor: Motor, speed_rpm: Array, torque_Nm: Array, current_A: Array) -> Array:
     """psi of (CR-17) where |u| is the planned voltage, V·s: zero where the drop alone is larger than that."""
     omega = _omega(motor, speed_rpm)
-    resistive = 2.0 * omega * _drop_V(motor, torque_Nm) + (motor.config.machine.r_ohm * current_A) ** 2
+    resistive = 2.0 * omega * _half_drop(motor, torque_Nm) + (motor.config.machine.r_ohm * current_A) ** 2
     volts = np.sqrt(np.clip(_planned_V(motor) ** 2 - resistive, 0.0, _circle_V(motor) ** 2))
     return np.minimum(volts / omega, FLUX_MAX * motor.bases.flux_Vs)
 
@@ -68,6 +68,6 @@ def voltage_speed(motor: Motor, i_d: Array, i_q: Array) -> Array:
     machine = motor.config.machine
     psi = np.maximum(flux(motor.model, i_d, i_q), 1e-6 * motor.bases.flux_Vs)
     left = np.maximum(_planned_V(motor) ** 2 - (machine.r_ohm * np.hypot(i_d, i_q)) ** 2, 0.0)
-    drop = _drop_V(motor, torque(motor.model, machine.pole_pairs, i_d, i_q))
+    drop = _half_drop(motor, torque(motor.model, machine.pole_pairs, i_d, i_q))
     omega = (np.sqrt(drop**2 + psi**2 * left) - drop) / psi**2
     return np.asarray(omega / machine.pole_pairs * 60 / (2 * np.pi))
