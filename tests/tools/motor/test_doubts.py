@@ -100,7 +100,7 @@ def test_a_map_in_millivolt_seconds_is_said_to_be_one(write: Write, iq_A: list[f
          "control.dead_time_compensation has no effect"),
         ({"machine": {"torque_max_Nm": 40.0}}, "torque_max_Nm = 40 N·m: i_max_A = 250 A makes 3.95 times"),
         ({"machine": {"iron_loss_hysteresis": 1300.0}},
-         r"iron_loss_hysteresis = 1300, iron_loss_eddy = 0: at \d+ rpm the iron takes .* a warning: 5 %\)"),
+         r"iron_loss_hysteresis = 1300, iron_loss_eddy = 0: at \d+ rpm the iron takes .* a warning: 3 %\)"),
         ({"magnet": {"i_d_demag_A": 0.6}}, "magnet.i_d_demag_A = 0.6 A, .* at 150 °C withstand 0.6 A of i_d"),
         ({"magnet": {"i_d_demag_A": 280.0, "i_d_demag_A_per_K": 3.0}}, "magnets at 150 °C withstand 0 A of i_d"),
     ],

@@ -35,7 +35,7 @@ RUN_UP_MOST_S, RUN_UP_LEAST_S = 200.0, 2e-4  # to top speed with all torque
 OFFSET_MAX = 0.05  # of the largest psi_q
 CURL_MAX = 0.05  # of the mean inductance
 STEP_MAX = 0.05  # of the largest flux linkage; the measured map of hsm1 has 0.017
-IRON_MAX = 0.05  # of torque_max_Nm: the current references supply it; the second level tolerates 3 to 6 % (SL-6)
+IRON_MAX = 0.03  # of torque_max_Nm: the current references supply it; the second level tolerates 3 to 6 % (SL-6)
 DEMAGNETISATION_MIN = 0.05  # of i_max, at the assumed temperature: less hardly weakens a field
 
 
