@@ -40,25 +40,24 @@ def faults(campaign: Path, out: Path | None, fresh: bool, is_slice: bool, record
     Exits with 1 when the status of a line in the table is not true.
     """
     from fluxtrue_tools.fault_campaign import plan as plans
-    from fluxtrue_tools.fault_campaign import run, spec
-    from fluxtrue_tools.sim.build import ROOT, prepare, sources
+    from fluxtrue_tools.fault_campaign import prepare, run, spec
+    from fluxtrue_tools.sim.build import ROOT
 
     _check_options(line, only, is_slice, record, scheduler)
     read = spec.read(campaign)
+    if read.is_emulated and record:
+        raise FluxtrueError(f"--record: the table has the results of the host, {campaign}: processor is 'emulated'")
     files = paths.outputs()
-    folders = []
-    for index, machine in enumerate(read.machine):
-        where = f"{campaign}: machine.{index}.motor"
-        files.reads(*sources(machine.motor, campaign.parent, where))
-        folder = prepare(machine.motor, build_dir, campaign.parent, where)
-        files.reads(folder.library, folder.data)
-        folders.append((folder.name, str(folder.folder)))
     table, rows = plans.read_rows(read, campaign.parent)
     files.reads(table)
     chosen = tuple(row for row in rows if any(fnmatchcase(row.id, one) for one in lines.split(",")))
-    if not chosen:
+    possible = prepare.possible(read, chosen)
+    if not possible:
         raise FluxtrueError(f"--lines {lines}: no line of {table} fits")
-    plan = plans.Plan(read, chosen, tuple(folders), is_slice)
+    folders, images = prepare.machines(read, campaign, build_dir, files)
+    plan = plans.Plan(read, possible, folders, is_slice, images)
+    if left_out := [row.id for row in chosen if row not in possible]:
+        click.echo(f"Not possible on the emulated processor, left out: {', '.join(left_out)}")
     if line is not None:
         click.echo(run.one_line(plan, line, only))
         return 0

@@ -13,14 +13,16 @@ import numpy as np
 from fluxtrue_tools.campaign.envelope import NOTHING_WRONG, Envelope, make_envelope
 from fluxtrue_tools.campaign.machine import Machine, data_sheet
 from fluxtrue_tools.campaign.spec import Nominal
+from fluxtrue_tools.emulate.ecu_loop import EmulatedEcuLoop
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.fault_campaign import fmea
 from fluxtrue_tools.fault_campaign.fmea import MET, OPEN, RECORDED, Point, Row
 from fluxtrue_tools.fault_campaign.oracle import Reruns
-from fluxtrue_tools.fault_campaign.run_point import Imposed, Trace, run_point
+from fluxtrue_tools.fault_campaign.run_point import Imposed, LoopOf, Trace, run_point
 from fluxtrue_tools.fault_campaign.spec import Faults
 from fluxtrue_tools.fault_campaign.verdict import evaluate
 from fluxtrue_tools.sim.build import MotorFolder
+from fluxtrue_tools.sim.ecu_loop import EcuLoop
 from fluxtrue_tools.sim.library import LoopError
 
 STRIDE = 7  # from a line's first point of the slice to its next one: prime to the number of points
@@ -34,6 +36,11 @@ class Plan:
     rows: tuple[Row, ...]
     folders: tuple[tuple[str, str], ...]  # name and built folder, as the campaign's machines
     is_slice: bool
+    images: tuple[tuple[str, str], ...] = ()  # image and layout of its data, likewise; empty: not emulated
+
+    def loop_of(self, index: int) -> LoopOf:
+        """What drives this machine."""
+        return partial(EmulatedEcuLoop, *map(Path, self.images[index])) if self.images else EcuLoop
 
     @property
     def cases(self) -> range:
@@ -78,13 +85,13 @@ def points_of(plan: Plan, index: int) -> tuple[Point, ...]:
 
 def chosen(plan: Plan, row: Row, number: int, index: int) -> list[Point]:
     """The points of a case; in the slice a few of them and the witness of a line of status physics, of an open one the
-    witness alone."""
+    witness alone. On the emulated processor a few of each line: the table's status is that of the host's runs."""
     held = [point for point in points_of(plan, index) if row.holds_at(point)]
     if not plan.is_slice:
         return held
     count = min(plan.campaign.slice_points, len(held))
     some = [held[(5 * number + STRIDE * index + k * len(held) // count) % len(held)] for k in range(count)]
-    if row.status != MET:
+    if row.status != MET and not plan.campaign.is_emulated:
         witness = [point for point in held if point.name == row.witness]
         some = witness if row.status == OPEN else some + witness
     return sorted(set(some), key=lambda point: (point.index, -point.sign))
@@ -93,18 +100,19 @@ def chosen(plan: Plan, row: Row, number: int, index: int) -> list[Point]:
 def run_one(plan: Plan, row: Row, index: int, point: Point) -> dict[str, Any]:
     """A run and its verdict."""
     machine = machine_of(*plan.folders[index])
+    run = partial(run_point, plan.campaign, machine.motor, loop_of=plan.loop_of(index))
     try:
-        trace, healthy = run_point(plan.campaign, machine.motor, row, point), replace(row, injection=())
+        trace, healthy = run(row, point), replace(row, injection=())
 
         def imposed(bridge: int, at_ms: float) -> Trace:
-            other = run_point(plan.campaign, machine.motor, row, point, Imposed(bridge, at_ms))
+            other = run(row, point, Imposed(bridge, at_ms))
             same = trace.time_ms <= at_ms
             if not np.array_equal(trace.rows[same], other.rows[same], equal_nan=True):
                 raise FluxtrueError("the run does not repeat itself up to the imposed state")
             return other
 
         return evaluate(row, plan.campaign.machine[index], machine.rated_Nm, point, trace,
-                        Reruns(imposed, partial(run_point, plan.campaign, machine.motor, healthy, point)))  # fmt: skip
+                        Reruns(imposed, partial(run, healthy, point)))  # fmt: skip
     except (FluxtrueError, LoopError) as error:
         raise FluxtrueError(f"{row.id} at {point.name}: {error}") from error
 

@@ -41,18 +41,19 @@ class Job:
 
 def _manifest(plan: Plan) -> dict[str, str]:
     built = b"".join(MotorFolder(name, Path(folder)).library.read_bytes() for name, folder in plan.folders)
+    built += b"".join(Path(image).read_bytes() for image, _ in plan.images)
     return {"campaign file or table of faults": plan.digest(), "firmware or plant": hashlib.sha256(built).hexdigest()}
 
 
 def whole(job: Job, *, fresh: bool, scheduler: str | None, workers: int | None) -> tuple[str, bool]:
     """The text for the terminal, and whether the table's status is true in every line."""
     plan, store = job.plan, Store(job.out)
-    for name, folder in plan.folders:
-        check_names(machine_of(name, folder).motor, plan.rows)
+    for index, (name, folder) in enumerate(plan.folders):
+        check_names(machine_of(name, folder).motor, plan.rows, plan.loop_of(index))
     with store.opened(_manifest(plan), fresh):
         schedule.missing(partial(run_case, plan), store, plan.cases, scheduler, workers)
         table = store.load(plan.cases)
-    scores = score(plan.rows, table)
+    scores = score(plan.rows, table, not plan.campaign.is_emulated)
     summary = summarise(scores, table)
     write_text(job.out / "summary.json", json_text(report.summary_data(plan, scores, summary)))
     write_text(job.out / "report.html", report.html(plan, scores, summary, job.command))

@@ -2,7 +2,7 @@
 """One fault at one operating point: the drive is started, brought there, the fault is injected, and all is recorded."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -16,6 +16,8 @@ from fluxtrue_tools.sim.ecu_loop import WRONG, Change, EcuLoop
 from fluxtrue_tools.sim.motor import Motor
 
 Array = NDArray[np.float64]
+LoopOf = Callable[[Motor, Mapping[str, float]], EcuLoop]
+"""Makes the loop of a motor and a plant."""
 BEFORE_MS: Final = 20
 RPM: Final = math.pi / 30.0  # rad/s
 START_SPEED: Final = 0.8  # of the largest
@@ -102,10 +104,10 @@ class _Drive:
         return {step.name: (at[0], at[1])}
 
 
-def check_names(motor: Motor, rows: Iterable[Row]) -> None:
+def check_names(motor: Motor, rows: Iterable[Row], loop_of: LoopOf = EcuLoop) -> None:
     """Refuse a name that is not there, before the first run."""
     point = Point(0, 1.0, motor.name, 0.0, 0.0, 0.0, 0.0)
-    with EcuLoop(motor, {}) as loop:
+    with loop_of(motor, {}) as loop:
         drive = _Drive(loop, point)
         for row in rows:
             for step in (*row.setup, *row.injection):
@@ -129,7 +131,7 @@ def _accelerate(loop: EcuLoop, from_rpm: float, to_rpm: float) -> None:
         loop.step_ms({"plant.speed_rad_s": (at[0], at[1])})
 
 
-def _start(campaign: Faults, motor: Motor, row: Row, point: Point) -> _Drive:
+def _start(campaign: Faults, motor: Motor, row: Row, point: Point, loop_of: LoopOf) -> _Drive:
     given = {step.name.removeprefix("plant."): step for step in row.setup if step.name.startswith("plant.")}
     speed = _slow(motor, point.speed_rpm) * RPM
     plant: dict[str, Any] = {**SENSORS, **campaign.plant, "speed_rad_s": speed, "vdc_start_V": motor.plant["vdc_V"],
@@ -137,7 +139,7 @@ def _start(campaign: Faults, motor: Motor, row: Row, point: Point) -> _Drive:
     base = motor.plant | plant
     for name, step in given.items():
         plant[name] = step.applied(base.get(name, 1.0 if name.endswith(("gain_a", "gain_b", "gain_c")) else 0.0), 0.0)
-    drive = _Drive(EcuLoop(motor, plant), point)
+    drive = _Drive(loop_of(motor, plant), point)
     for step in row.setup:
         if step.name != REQUEST_LATER and not step.name.startswith("plant."):
             drive.apply(step)
@@ -170,9 +172,10 @@ def _watch(drive: _Drive, row: Row, watch_ms: int,
     return rows, ecu
 
 
-def run_point(campaign: Faults, motor: Motor, row: Row, point: Point, imposed: Imposed | None = None) -> Trace:
+def run_point(campaign: Faults, motor: Motor, row: Row, point: Point, imposed: Imposed | None = None,
+              loop_of: LoopOf = EcuLoop) -> Trace:  # fmt: skip
     """The same numbers wherever and whenever it runs, with `imposed` up to its beginning."""
-    drive = _start(campaign, motor, row, point)
+    drive = _start(campaign, motor, row, point, loop_of)
     loop = drive.loop
     with loop:
         waits = next((step.applied(0.0, point.torque_Nm) for step in row.setup if step.name == REQUEST_LATER), None)

@@ -24,6 +24,7 @@ class Score:
     vdc_V: float
     worst: str  # the run that is furthest from what is demanded, of those not met if there are any, or empty
     why: str
+    is_host: bool = True  # false: the table's status is that of other runs, at more points
 
     @property
     def is_met(self) -> bool:
@@ -37,7 +38,9 @@ class Score:
 
     @property
     def is_true(self) -> bool:
-        """Whether the table agrees with the results."""
+        """Whether the table agrees with the results; other runs may be better than the table's, never worse."""
+        if not self.is_host:
+            return self.row.status == OPEN or self.status != OPEN
         return self.row.status == self.status
 
     @property
@@ -63,7 +66,7 @@ def _name(run: "pd.Series[object]") -> str:
     return f"{run['motor']}/{run['point']}/{'+' if float(str(run['sign'])) > 0 else '-'}"
 
 
-def _score(row: Row, runs: pd.DataFrame) -> Score:
+def _score(row: Row, runs: pd.DataFrame, is_host: bool) -> Score:
     by_physics, missed = runs[runs["verdict"] == PHYSICS], runs[~runs["met"]]
     worst, why = "", ""
     if len(told := missed if len(missed) else by_physics):
@@ -72,13 +75,13 @@ def _score(row: Row, runs: pd.DataFrame) -> Score:
         worst, why = _name(first), str(first["why"])
     return Score(row, len(runs), int(runs["met"].sum()), len(by_physics), float(runs["detect_ms"].max()),
                  float(runs["harm_ms"].max()), float(runs["beyond_Nm"].max()), float(runs["current_A"].max()),
-                 float(runs["vdc_V"].max()), worst, why)  # fmt: skip
+                 float(runs["vdc_V"].max()), worst, why, is_host)  # fmt: skip
 
 
-def score(rows: tuple[Row, ...], table: pd.DataFrame) -> list[Score]:
+def score(rows: tuple[Row, ...], table: pd.DataFrame, is_host: bool = True) -> list[Score]:
     """In the table's order; a line that speaks of no operating point is left out."""
     by_row = dict(tuple(table.groupby("row")))
-    return [_score(row, by_row[row.id]) for row in rows if row.id in by_row]
+    return [_score(row, by_row[row.id], is_host) for row in rows if row.id in by_row]
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 """campaign.toml of the faults: machines, operating points, and the table of the faults."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
@@ -40,6 +40,12 @@ class Faults(Strict):
     settle_ms: Annotated[int, Field(ge=10, le=10000)] = 100
     watch_ms: Annotated[int, Field(ge=10, le=10000)] = 250
     plant: dict[str, strict.Flag] = Field(default_factory=dict)
+    processor: Literal["host", "emulated"] = "host"
+
+    @property
+    def is_emulated(self) -> bool:
+        """The flashed image runs on the emulated processor, not the firmware on this computer."""
+        return self.processor == "emulated"
 
 
 def read(path: Path) -> Faults:

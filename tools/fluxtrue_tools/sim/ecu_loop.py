@@ -85,11 +85,14 @@ class EcuLoop(Loop):
     def __init__(self, motor: Motor, plant: Mapping[str, float]) -> None:
         self._handle: int = 0
         link = {"dc_link_F": DC_LINK_F, "avalanche_V": AVALANCHE_PER_BATTERY * motor.plant["vdc_V"]}
-        self.names: Members = members(str(motor.folder.library))
+        self.names: Members = self._names(motor)
         self.sender = Sender(read_interface(motor.folder.dbc))
         self.time_ms = 0
         super().__init__(motor.library, {**motor.plant, **link, "imposed_speed": 1.0, **plant}, motor.flux_map)
         self.periods_per_ms = round(1e-3 / self.period_s)
+
+    def _names(self, motor: Motor) -> Members:
+        return members(str(motor.folder.library))
 
     def _create(self, controller: str) -> int | None:
         self._handle = self._library.fluxtrue_create()
@@ -130,12 +133,20 @@ class EcuLoop(Loop):
                 change: Change | None = None) -> NDArray[np.float64]:  # fmt: skip
         """One millisecond with the frames that are due in it."""
         for frame in self.sender.frames(self.time_ms):
-            self._library.can_host_put(self._handle, ctypes.byref(frame))
+            self._put(frame)
         rows = self.run(self.periods_per_ms, ramps) if change is None else self._changed(ramps or {}, change)
-        while self._library.can_host_take(self._handle, ctypes.byref(Frame())):
-            pass
+        self._take_all()
         self.time_ms += 1
         return rows
+
+    def _put(self, frame: Frame) -> None:
+        """A frame arrives at the firmware."""
+        self._library.can_host_put(self._handle, ctypes.byref(frame))
+
+    def _take_all(self) -> None:
+        """What the firmware has sent is thrown away."""
+        while self._library.can_host_take(self._handle, ctypes.byref(Frame())):
+            pass
 
     def steps(self, milliseconds: int, **command: Any) -> None:
         """Some time, after a change of the command; what is recorded meanwhile is not kept."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Members of the firmware's state by the names of its source, found in the library's debug information.
+"""Members of the firmware's state by the names of its source, found in the debug information of library or image.
 
 Tests use them to plant a fault in memory, and to read what no name of fluxtrue_get() tells.
 """
@@ -44,9 +44,10 @@ def _member(die: DIE, name: str) -> tuple[DIE, int] | None:
 
 @dataclass(frozen=True)
 class Members:
-    """The state's layout."""
+    """The layout of a type."""
 
     path: str
+    type: str
     root: DIE
 
     def find(self, member: str) -> tuple[int, Any]:
@@ -63,15 +64,24 @@ class Members:
                 die, offset = element, offset + int(index) * size(element)
         return offset, _number(member, bare(die))
 
+    def place(self, member: str) -> tuple[int, Any]:
+        """The same, found once."""
+        return _place(self.path, self.type, member)
+
     def read(self, address: int, member: str) -> float:
-        """The number at an instance."""
-        offset, kind = _found(self.path, member)
+        """The number at an instance in this process."""
+        offset, kind = self.place(member)
         return float(kind.from_address(address + offset).value)
 
     def write(self, address: int, member: str, value: float) -> None:
-        """Changes it; whole numbers wrap as in C."""
-        offset, kind = _found(self.path, member)
-        kind.from_address(address + offset).value = value if kind in _FLOATS.values() else int(value)
+        """Changes it there; whole numbers wrap as in C."""
+        offset, kind = self.place(member)
+        kind.from_address(address + offset).value = as_value(kind, value)
+
+
+def as_value(kind: Any, value: float) -> float | int:
+    """What a ctypes type takes."""
+    return value if kind in _FLOATS.values() else int(value)
 
 
 def _pointers(die: DIE, path: str) -> Iterator[str]:
@@ -103,19 +113,25 @@ def _number(member: str, die: DIE) -> Any:
 
 
 @cache
-def _found(path: str, member: str) -> tuple[int, Any]:
-    return members(path).find(member)
+def _place(path: str, kind: str, member: str) -> tuple[int, Any]:
+    return members(path, kind).find(member)
+
+
+def _is_type(die: DIE, kind: str) -> bool:
+    """A struct with a tag, or the name of one without."""
+    whole = die.tag == "DW_TAG_typedef" or (die.tag == "DW_TAG_structure_type" and "DW_AT_byte_size" in die.attributes)
+    return whole and name_of(die) == kind
 
 
 @cache
-def members(path: str) -> Members:
-    """The members of a library built with debug information."""
+def members(path: str, kind: str = INSTANCE) -> Members:
+    """The members of a type in a library or an image built with debug information."""
     file = Path(path).open("rb")  # noqa: SIM115 (pyelftools reads when it is asked)
     elf = ELFFile(file)
     if not elf.has_dwarf_info():
         raise FluxtrueError(f"{path}: no debug information, allowed: a build with -g, as the presets make it")
     for unit in elf.get_dwarf_info().iter_CUs():
         for die in unit.get_top_DIE().iter_children():
-            if die.tag == "DW_TAG_structure_type" and name_of(die) == INSTANCE and "DW_AT_byte_size" in die.attributes:
-                return Members(path, die)
-    raise FluxtrueError(f"{path}: no struct {INSTANCE} in its debug information")
+            if _is_type(die, kind):
+                return Members(path, kind, die)
+    raise FluxtrueError(f"{path}: no type {kind} in its debug information")

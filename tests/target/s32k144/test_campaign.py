@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A slice of the fault campaign with the flashed image on the emulated processor."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from fluxtrue_tools.bench.build import have_arm_compiler
+from fluxtrue_tools.emulate import build
+from fluxtrue_tools.emulate.ecu_loop import EmulatedEcuLoop
+from fluxtrue_tools.errors import FluxtrueError
+
+ROOT = Path(__file__).resolve().parents[3]
+CAMPAIGN = ROOT / "tests" / "fault" / "emulated.toml"
+LINES = ("healthy", "winding-hot", "current-a-open", "angle-frozen-fast", "dc-sensor-far-low", "lead-a-open",
+         "switch-upper-c-open", "battery-open-regen", "gate-fault", "command-lost", "command-crc", "enable-withdrawn",
+         "memory-1", "memory-10", "inverter-sensor-broken")  # fmt: skip
+LEFT_OUT = "inverter-sensor-broken"  # its cause is a member of the host's port
+CHECKSUM = "memory-1"  # a word of the motor data changes: only the image's lie in a flash with a checksum
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiler() -> None:
+    if not have_arm_compiler():
+        pytest.skip("no cross compiler: there is no image to emulate")
+
+
+def faults(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "fluxtrue_tools", "faults", str(CAMPAIGN), *map(str, arguments)]
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "tools")}
+    return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+
+
+def test_the_image_reacts_to_the_faults_of_the_table_as_the_table_demands(tmp_path: Path) -> None:
+    done = faults("--slice", "--lines", ",".join(LINES), "--out", tmp_path / "out", "--workers", 2)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert f"left out: {LEFT_OUT}" in done.stdout
+    runs = pd.read_parquet(tmp_path / "out" / "results.parquet")
+    assert set(runs["row"]) == set(LINES) - {LEFT_OUT}
+    assert set(runs.loc[runs["row"] == CHECKSUM, "first_fault"]) == {"config"}, "not the image has run"
+
+
+def test_the_results_are_not_recorded_in_the_table_of_the_host(tmp_path: Path) -> None:
+    done = faults("--record", "--out", tmp_path / "out")
+    assert done.returncode == 2
+    assert "--record: the table has the results of the host" in done.stderr
+
+
+def test_members_of_the_image_have_the_names_of_the_source() -> None:
+    parts = build.prepare("hsm1", angle="resolver", flashed=True)
+    with EmulatedEcuLoop(parts.image, parts.layout, parts.motor, {"imposed_speed": 1.0}) as loop:
+        loop.power_up()
+        loop.steps(50, TorqueRequested=40.0)
+        base_Nm = json.loads(parts.motor.folder.data.read_text(encoding="utf-8"))["bases"]["torque_Nm"]
+        assert loop.read("drive.task.torque_commanded") == pytest.approx(40.0 / base_Nm * 32768.0, abs=2.0)
+        loop.write("drive.task.torque_commanded", -5.0)
+        assert loop.read("drive.task.torque_commanded") == -5.0
+        assert loop.read("motor.angle_tracker.pole_pairs") == parts.motor.plant["pole_pairs"]
+        with pytest.raises(FluxtrueError, match="no member 'board'"):
+            loop.read("board.winding_broken")
