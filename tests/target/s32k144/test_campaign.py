@@ -16,6 +16,7 @@ from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.ecu_loop import EmulatedEcuLoop
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.fault_campaign import fmea
 
 ROOT = Path(__file__).resolve().parents[3]
 CAMPAIGN = ROOT / "tests" / "fault" / "emulated.toml"
@@ -32,8 +33,8 @@ def compiler() -> None:
         pytest.skip("no cross compiler: there is no image to emulate")
 
 
-def faults(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "fluxtrue_tools", "faults", str(CAMPAIGN), *map(str, arguments)]
+def faults(*arguments: object, campaign: Path = CAMPAIGN) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "fluxtrue_tools", "faults", str(campaign), *map(str, arguments)]
     environment = os.environ | {"PYTHONPATH": str(ROOT / "tools")}
     return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
 
@@ -51,6 +52,30 @@ def test_the_results_are_not_recorded_in_the_table_of_the_host(tmp_path: Path) -
     done = faults("--record", "--out", tmp_path / "out")
     assert done.returncode == 2
     assert "--record: the table has the results of the host" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("expected", "status", "code"),
+    [
+        ("over_current", "met", 0),
+        ("over_current", "open", 0),  # two of the many points of the host's runs: fewer may show less
+        ("over_speed", "met", 1),
+        ("over_speed", "open", 0),
+    ],
+)
+def test_a_line_that_says_met_must_not_be_open_with_the_image(
+    tmp_path: Path, expected: str, status: str, code: int
+) -> None:
+    (tmp_path / "one.toml").write_text(
+        'fmea = "fmea.csv"\nprocessor = "emulated"\nsigns = [1]\npoints = [[0.2, 0.5]]\n[[machine]]\nmotor = "hsm1"\n'
+        "current_A = 600\nvdc_V = 500\n",
+        encoding="utf-8",
+    )
+    line = f"open,sensor,input open,,plant.current_open_a=1,,safe_state,{expected},5,,50,,,,60,{status},hsm1/0/+,,\n"
+    (tmp_path / "fmea.csv").write_text(",".join(fmea.COLUMNS) + "\n" + line, encoding="utf-8")
+    done = faults("--out", tmp_path / "out", campaign=tmp_path / "one.toml")
+    assert done.returncode == code, done.stdout + done.stderr
+    assert ("status met is NOT TRUE" in done.stdout) == bool(code)
 
 
 def test_members_of_the_image_have_the_names_of_the_source() -> None:
