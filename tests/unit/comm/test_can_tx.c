@@ -90,6 +90,57 @@ void test_every_message_comes_exactly_in_its_cycle_time(void)
     }
 }
 
+/* What the ECU asks before it gathers the values of a message; identifiers copied by hand from the DBC. */
+static const struct {
+    bool (*may_send)(const can_tx_t *);
+    uint32_t ids[4];
+} questions[] = {
+    {can_tx_may_send_voltage_or_currents, {0x211, 0x212}},
+    {can_tx_may_send_status, {0x210}},
+    {can_tx_may_send_limits, {0x215}},
+    {can_tx_may_send_temperatures, {0x214}},
+    {can_tx_may_send_identification, {0x213}},
+    {can_tx_may_send_diagnostics, {0x230, 0x231, 0x232, 0x233}},
+};
+#define QUESTIONS (sizeof questions / sizeof questions[0])
+
+static bool is_one_of(const uint32_t ids[4], uint32_t id)
+{
+    return id == ids[0] || id == ids[1] || id == ids[2] || id == ids[3];
+}
+
+void test_the_values_of_a_frame_are_asked_for_before_it_is_sent_and_only_in_its_slot(void)
+{
+    bool refused[QUESTIONS] = {0};
+    for (int ms = 1; ms <= RUN_MS; ms++) {
+        bool may[QUESTIONS];
+        can_tx_begin(&tx, 1);
+        for (unsigned k = 0; k < QUESTIONS; k++) {
+            may[k] = questions[k].may_send(&tx);
+            refused[k] = refused[k] || !may[k];
+        }
+        while (can_tx_next(&tx, &telemetry, &frame) == TX_FRAME) {
+            for (unsigned k = 0; k < QUESTIONS; k++) {
+                TEST_ASSERT_TRUE(may[k] || !is_one_of(questions[k].ids, frame.id));
+            }
+        }
+    }
+    for (unsigned k = 0; k < QUESTIONS; k++) {
+        TEST_ASSERT_TRUE(refused[k]);
+    }
+}
+
+/* A step that found no time to send leaves nothing to the next one, whose frames would be late. */
+void test_what_a_step_has_not_sent_is_dropped(void)
+{
+    can_tx_begin(&tx, 10); /* every message that has a cycle of 10 ms */
+    TEST_ASSERT_TRUE(can_tx_due(&tx));
+    can_tx_t fresh = {.time_ms = tx.time_ms};
+    can_tx_begin(&fresh, 1);
+    can_tx_begin(&tx, 1);
+    TEST_ASSERT_EQUAL_UINT16(fresh.pending, tx.pending);
+}
+
 /* Steps of PWM frequencies such as 4.5, 5.5 and 22.5 kHz: each frame is sent less than a step from its due time, and in
  * 10 s none is missing. */
 void test_with_another_step_every_message_keeps_its_cycle_time_in_the_mean_and_each_frame_within_a_step(void)
