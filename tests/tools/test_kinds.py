@@ -50,6 +50,13 @@ def test_what_it_cannot_mean_is_refused_by_the_option_s_name(kind: click.ParamTy
         kind.convert(text, OPTION, None)
 
 
+def test_the_help_names_a_range_only_where_there_is_one() -> None:
+    with click.Context(click.Command("it")) as context:
+        shown = [click.Option(["--it"], type=kind, default=0.0).get_help_record(context) or ("", "")
+                 for kind in (kinds.Finite(), kinds.Finite(max=2.0), kinds.Finite(min=1.0, max=2.0))]  # fmt: skip
+    assert [text for _, text in shown] == ["", "[x<=2.0]", "[1.0<=x<=2.0]"]
+
+
 @pytest.mark.parametrize("text", ["missing", "file", "x" * 300])
 def test_a_folder_to_read_must_be_one(tmp_path: Path, text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

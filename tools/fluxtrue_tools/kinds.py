@@ -31,6 +31,10 @@ class Finite(click.FloatRange):
             raise FluxtrueError(f"{label(param)} {value}: allowed: a finite number")
         return number
 
+    def _describe_range(self) -> str:
+        """The range for --help, where click would call no range at all "x<=None"."""
+        return "" if self.min is None and self.max is None else super()._describe_range()
+
 
 class Text(click.ParamType):
     """Any text but an empty one."""

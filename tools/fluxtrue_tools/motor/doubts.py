@@ -73,6 +73,7 @@ def _units(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
         key = "machine.lq_H" if machine.flux_map is None else f"{machine.flux_map}: psi_q_Vs"
         yield Doubt(f"{key}: i_max_A makes {psi_q / psi_f:.0f} times the magnet's flux in the q axis, as if an "
                     "inductance were in mH; wanted: H, V·s and A", True)  # fmt: skip
+    yield from _exchanged(config, model)
     whole = _whole_flux(config, model)
     used = config.omega_max_rad_s * whole / _reach_V(config)
     if used < EMF_MIN or (used < 1.0 and emf < EMF_MAGNET_MIN):
@@ -81,6 +82,24 @@ def _units(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
                     f"of the phase voltage that vdc_V = {config.inverter.vdc_V:g} V gives, the magnet alone "
                     f"{100 * emf:.2g} %; "
                     f"as rad/s it would be {rad_s:.0f} rpm")  # fmt: skip
+
+
+def _exchanged(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
+    """Axes of a reluctance machine, whose d axis many programs lay along the larger inductance, not along the magnet.
+
+    At i_d = -i_max the torque falls with i_q. No machine is accepted for which that is so.
+    """
+    machine, i_max_A = config.machine, config.machine.i_max_A
+    if float(model.psi_d(-i_max_A, 0.0) + i_max_A * model.psi_q(-i_max_A, 0.0, nq=1)) > 0.0:
+        return
+    wanted = "wanted: the d axis along the magnet, where a reluctance machine has its smaller inductance"
+    if machine.ld_H is not None and machine.lq_H is not None and machine.psi_f_Vs is not None:
+        most_H = machine.lq_H + machine.psi_f_Vs / i_max_A
+        yield Doubt(f"machine.ld_H = {machine.ld_H:g} H, lq_H = {machine.lq_H:g} H: at i_d = {-i_max_A:g} A the torque "
+                    f"falls with i_q; are the two exchanged? {wanted}, and ld_H below {most_H:.4g} H", True)  # fmt: skip
+    else:
+        yield Doubt(f"{machine.flux_map}: at id_A = {-i_max_A:g} the torque falls with iq_A; {wanted}. A map with d "
+                    "along the larger inductance is turned by: motor import --axes synrm", True)  # fmt: skip
 
 
 def _values(config: MotorConfig) -> Iterator[Doubt]:

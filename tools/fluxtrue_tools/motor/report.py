@@ -26,8 +26,9 @@ def _machine(motor: Motor) -> Lines:
     machine, inverter = motor.config.machine, motor.config.inverter
     flux = "constants" if motor.flux_map is None else f"map {machine.flux_map}"
     l_d, l_q = float(motor.model.psi_d(0.0, 0.0, nd=1)), float(motor.model.psi_q(0.0, 0.0, nq=1))
+    pairs = "1 pole pair" if machine.pole_pairs == 1 else f"{machine.pole_pairs} pole pairs"
     return [
-        f"motor {machine.name}: {machine.pole_pairs} pole pairs, {flux}",
+        f"motor {machine.name}: {pairs}, {flux}",
         f"  at no current      psi_f {1e3 * motor.derived.psi_f_Vs:.2f} mV·s, L_d {1e6 * l_d:.0f} µH, "
         f"L_q {1e6 * l_q:.0f} µH, R {1e3 * machine.r_ohm:g} mΩ (20 °C)",
         f"  limits             {machine.i_max_A:g} A, {machine.torque_max_Nm:g} N·m "
