@@ -81,7 +81,7 @@ def test_a_slip_of_the_units_is_said_not_its_consequence(write: Write, changes: 
 
 
 def test_exchanged_axes_of_a_reluctance_machine_are_said_to_be_so(write: Write) -> None:
-    """The torque's slope with i_q at i_d = -250 A: 0.084 + 250 (0.5e-3 - 0.9e-3) < 0, by hand -16 mV·s, and -10 mV·s."""
+    """The torque's slope with i_q at i_d = -250 A: 0.084 + 250 (0.5e-3 - 0.9e-3) < 0, -16 mV·s, and -10 mV·s."""
     constants = refusal(write(machine={"ld_H": 0.9e-3, "lq_H": 0.5e-3}))
     assert "machine.ld_H = 0.0009 H, lq_H = 0.0005 H: at i_d = -250 A the torque falls with i_q" in constants
     assert "are the two exchanged?" in constants and "ld_H below 0.000836 H" in constants

@@ -96,7 +96,8 @@ def _exchanged(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
     if machine.ld_H is not None and machine.lq_H is not None and machine.psi_f_Vs is not None:
         most_H = machine.lq_H + machine.psi_f_Vs / i_max_A
         yield Doubt(f"machine.ld_H = {machine.ld_H:g} H, lq_H = {machine.lq_H:g} H: at i_d = {-i_max_A:g} A the torque "
-                    f"falls with i_q; are the two exchanged? {wanted}, and ld_H below {most_H:.4g} H", True)  # fmt: skip
+                    f"falls with i_q; are the two exchanged? {wanted}, and ld_H below {most_H:.4g} H",
+                    True)  # fmt: skip
     else:
         yield Doubt(f"{machine.flux_map}: at id_A = {-i_max_A:g} the torque falls with iq_A; {wanted}. A map with d "
                     "along the larger inductance is turned by: motor import --axes synrm", True)  # fmt: skip
