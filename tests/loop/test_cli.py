@@ -69,6 +69,11 @@ def test_a_plot_takes_its_format_from_its_name(tmp_path: Path, scenario: Path, s
         (GOOD, ["--motor", "a;b"], "--motor = 'a;b', allowed: hsm1, paper, or a folder whose path has none of ;"),
         (GOOD, ["--out", "missing/run.csv"], "missing/run.csv: cannot be written"),
         (GOOD, ["--motor", "hsm2"], "--motor = 'hsm2': neither a folder with a motor.toml nor one of hsm1, paper"),
+        (
+            GOOD,
+            ["--motor", "bad.toml"],
+            "--motor = 'bad.toml': neither a folder with a motor.toml nor one of hsm1, paper",
+        ),
         (GOOD, ["--build-dir", "empty"], "libfluxtrue_sim.so is missing: cmake --build"),
         (GOOD, ["--speed", "3"], "No such option"),
         (GOOD + "[plant]\nvdc = 3", [], "plant.vdc: unknown key"),

@@ -98,12 +98,19 @@ def test_every_deviation_of_the_plant_can_be_given(hsm1: Motor) -> None:
         (HEAD + "[plant]\nsubsteps = 100000", "plant.substeps = 100000"),
         (HEAD + "[controller]\n'plant.r_ohm_20' = 1", "plant.r_ohm_20 is not the controller's"),
         (HEAD + "[[event]]\nt = 0\nset = { enable = 'no' }", "event.0.set.enable = 'no'"),
-        (HEAD + "[[event]]\nt = 0\nsets = { enable = 1 }", "event.0"),
+        (HEAD + "[[event]]\nt = 0\nsets = { enable = 1 }", "event.0.sets: unknown key, allowed: t, set"),
+        ('motor = "hsm1"\nduration = 1', "duration: unknown key, allowed: motor, expect_fault, duration_s"),
         (HEAD + "[[event]]\nt = 0\nset = { enable = 0.5 }", "event.0.set.enable = 0.5, allowed: true or false"),
         (HEAD + "[[event]]\nt = 0\nset = { 'plant.adc_bits' = 9.5 }", "plant.adc_bits = 9.5, allowed: a whole number"),
         (HEAD + "[[event]]\nt = 0\nset = { 'plant.phase_open_b' = 2 }", "plant.phase_open_b = 2, allowed: true or"),
-        (HEAD + "[window]\nfrom_s = 0.04\nto_s = 0.03", "window: 0.04 to 0.03 s"),
-        (HEAD + "[window]\nto_s = 1", "window"),
+        (
+            HEAD + "[window]\nfrom_s = 0.04\nto_s = 0.03",
+            "window: from_s = 0.04 s, to_s = 0.03 s, allowed: from_s below to_s",
+        ),
+        (
+            HEAD + "[window]\nto_s = 1",
+            "window: from_s = 0.7 s, to_s = 1 s, allowed: from_s below to_s, to_s up to duration_s = 0.05 s",
+        ),
         (
             HEAD + "[profile]\nmagnet_scale = [[0, 1], [1, 0.9]]\n[[event]]\nt = 0\nset = { 'plant.magnet_scale' = 1 }",
             "the profile drives it",

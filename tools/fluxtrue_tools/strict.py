@@ -180,9 +180,21 @@ def _keys(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
     return ", ".join(kind.model_fields) if known else ""
 
 
+def _cause(errors: list[Any]) -> Any:
+    """The error to name: the first one, or an unknown key of the table in which the first one misses a key.
+
+    A misspelt key causes both, and only the unknown key shows the user the slip.
+    """
+    first = errors[0]
+    if first["type"] != "missing":
+        return first
+    misspelt = (e for e in errors if e["type"] == "extra_forbidden" and e["loc"][:-1] == first["loc"][:-1])
+    return next(misspelt, first)
+
+
 def explain(error: ValidationError, model: type[BaseModel], words: dict[str, str] | None = None) -> str:
-    """The first error as one line. `words` replaces the description of the values that a key takes."""
-    first = error.errors()[0]
+    """One error as one line. `words` replaces the description of the values that a key takes."""
+    first = _cause(error.errors())
     location = tuple(part for part in first["loc"] if not str(part).startswith("function-"))
     where = ".".join(map(str, location))
     if first["type"] == "extra_forbidden":

@@ -9,6 +9,7 @@ from conftest import SMALL
 
 from fluxtrue_tools.campaign.score import Score, bounds, score
 from fluxtrue_tools.campaign.spec import Campaign, parse
+from fluxtrue_tools.campaign.terminal import figures_table
 from fluxtrue_tools.errors import FluxtrueError
 
 CHECKED = SMALL + '[check]\ncontrollers = ["paper"]\n'
@@ -48,6 +49,14 @@ def test_errors_are_pooled_by_band_with_both_directions_together(campaign: Campa
     assert got["high"].rms == pytest.approx(math.sqrt((36 + 64) / 2))
     assert got["low"].worst == 4.0
     assert got["low"].ratio == pytest.approx(math.sqrt(12.5) / 0.5)
+
+
+def test_a_figure_that_does_not_exist_is_a_dash_in_the_table(campaign: Campaign) -> None:
+    data = table([(400, 1)], [(400, 3)], bound_percent=math.nan)
+    lines = figures_table(campaign, [scored(campaign, data)]).splitlines()
+    low, high, _ = (line.split() for line in lines[2:])
+    assert low[-6:] == ["1", "3.00", "3.00", "3.00", "-", "-"]
+    assert high[-6:] == ["0", "-", "-", "-", "-", "-"]
 
 
 def test_a_slow_machine_is_held_to_the_bounds_from_its_own_crawl_rpm_on() -> None:

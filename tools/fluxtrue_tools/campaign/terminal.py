@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A campaign's outcome as text."""
 
+import math
+
 import pandas as pd
 
 from fluxtrue_tools import faults
@@ -16,6 +18,11 @@ def columns(cells: list[tuple[str, ...]]) -> str:
     return "\n".join([lines[0], "  ".join("-" * width for width in widths), *lines[1:]])
 
 
+def _figure(value: float) -> str:
+    """Two digits; a dash where there is nothing to state, such as the bound of a controller that identifies nothing."""
+    return f"{value:.2f}" if math.isfinite(value) else "-"
+
+
 def band_name(campaign: Campaign, band: str) -> str:
     """The name of a band in words."""
     crawl, split = campaign.check.crawl_rpm, campaign.check.band_rpm
@@ -29,8 +36,8 @@ def figures_table(campaign: Campaign, scores: list[Score]) -> str:
     for scored in scores:
         for band in (*BANDS, CRAWL):
             f = scored.bands[band]
-            cells.append((scored.controller, band_name(campaign, band), str(f.windows), f"{f.rms:.2f}", f"{f.p99:.2f}",
-                          f"{f.worst:.2f}", f"{f.bound_rms:.2f}", f"{f.ratio:.2f}"))  # fmt: skip
+            cells.append((scored.controller, band_name(campaign, band), str(f.windows),
+                          *map(_figure, (f.rms, f.p99, f.worst, f.bound_rms, f.ratio))))  # fmt: skip
     return columns(cells)
 
 
@@ -75,7 +82,7 @@ def case_table(campaign: Campaign, table: pd.DataFrame) -> str:
         bound = rows["bound_percent"].max()
         cells.append((str(window), f"{rows['speed_rpm'].iloc[0]:.1f}", f"{rows['torque_requested_Nm'].iloc[0]:.3f}",
                       *(f"{rows['torque_Nm'][name]:.10g}" for name in names),
-                      *(f"{rows['error_percent'][name]:+.2f}" for name in names), f"{bound:.2f}"))  # fmt: skip
+                      *(f"{rows['error_percent'][name]:+.2f}" for name in names), _figure(bound)))  # fmt: skip
     words = table.groupby("controller", sort=False)["run_fault_word"].first()
     said = [f"{name}: {', '.join(faults.named(int(word)))}" for name, word in words.items() if word]
     tripped = "; ".join(said) or "no trip"

@@ -75,7 +75,7 @@ def locate(motor: str, base: Path, where: str = "motor") -> tuple[str, Path]:
     try:
         folder = (base / Path(motor).expanduser()).resolve()
         found = stat.S_ISREG((folder / "motor.toml").stat().st_mode)
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         found = False
     except (OSError, RuntimeError, ValueError) as error:  # a loop of links, an unknown ~user, a name that is too long
         raise FluxtrueError(f"{where} = {motor!r}: {getattr(error, 'strerror', None) or error}") from None

@@ -300,8 +300,8 @@ class Scenario(Strict):
             raise ValueError(f"{speed}: with an inertia only the initial speed can be given")
         first, last = self.averaged()
         if not first < last <= self.duration_s:
-            end = f"duration_s = {self.duration_s:g} s"
-            raise ValueError(f"window: {first:g} to {last:g} s, allowed: within 0 to {end}")
+            raise ValueError(f"window: from_s = {first:g} s, to_s = {last:g} s, allowed: from_s below to_s, to_s up to "
+                             f"duration_s = {self.duration_s:g} s")  # fmt: skip
         if self.expect_fault is not None and self.expect_fault not in faults.names().values():
             raise ValueError(f"expect_fault = {self.expect_fault!r}, allowed: {', '.join(faults.names().values())}")
         return self
