@@ -10,11 +10,15 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
+from unittest.mock import create_autospec
 
 import can
 import pytest
 from progress import HANG_S
 
+from fluxtrue_tools.bus.address import BusAddress
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.scope.xcp import WallLine
 from fluxtrue_tools.vecu.channel import BenchRefused, Channel
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 from fluxtrue_tools.vecu.stepped import client_port, connect
@@ -48,6 +52,46 @@ def stand(ecu: VirtualEcu) -> Iterator[Channel]:
     channel = Channel(HOST, ecu.bench_port)
     yield channel
     channel.close()
+
+
+def address(port: int) -> BusAddress:
+    return BusAddress("socketcand", "can0", {"host": HOST, "port": port})
+
+
+def test_a_wrong_port_is_refused_with_one_message(
+    ecu: VirtualEcu, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Each port in place of the other one, which does not answer, and a port on which nothing listens."""
+    with socket.socket() as closed:
+        closed.bind((HOST, 0))
+        with pytest.raises(FluxtrueError, match=f"port={closed.getsockname()[1]}: Connection refused; wanted: the CAN"):
+            address(closed.getsockname()[1]).connect()
+    address(ecu.can_port).connect().shutdown()
+    Channel.at(f"{HOST}:{ecu.bench_port}", "--bench").close()
+    monkeypatch.setattr("fluxtrue_tools.bus.address.GREETING_S", 0.1)
+    monkeypatch.setattr("fluxtrue_tools.vecu.channel.GREETING_S", 0.1)
+    with pytest.raises(FluxtrueError, match=f"port={ecu.bench_port}: no socketcand server answers there"):
+        address(ecu.bench_port).connect()
+    with pytest.raises(FluxtrueError, match=f"{ecu.can_port}: no bench answers there"):
+        Channel.at(f"{HOST}:{ecu.can_port}", "--bench")
+    assert caplog.text == ""
+
+
+@pytest.mark.parametrize("name", ["host", "port"])
+def test_a_socketcand_server_needs_host_and_port(name: str) -> None:
+    options = {"host": HOST, "port": 1}
+    del options[name]
+    with pytest.raises(FluxtrueError, match=f"--can-interface socketcand: missing: --can-option {name}="):
+        BusAddress("socketcand", "can0", options).connect()
+
+
+def test_a_lost_bus_ends_an_xcp_session_with_one_line() -> None:
+    """python-can's message of a lost connection contains a traceback."""
+    bus = create_autospec(can.BusABC, instance=True)
+    bus.send.side_effect = can.CanError("Failed to send: Connection reset by peer\nTraceback (most recent call last):")
+    with pytest.raises(FluxtrueError) as error:
+        WallLine(bus).exchange(can.Message())
+    assert str(error.value) == "the bus is lost: Failed to send: Connection reset by peer"
 
 
 def raw(port: int) -> socket.socket:

@@ -62,7 +62,7 @@ def connected(bench: Bench, motor: Motor, known: Nameplate) -> Iterator[OverTheB
         description = read(bench.elf)
         bus = bench.address.connect()
         stack.callback(bus.shutdown)
-        channel = None if bench.channel is None else Channel(*bench.channel)
+        channel = None if bench.channel is None else Channel.greeted(*bench.channel)
         if channel is not None:
             stack.callback(channel.close)
         line = Line(_clock(bus, channel), read_interface(motor.folder.dbc))

@@ -192,7 +192,7 @@ def live(motor: str, can_interface: str | None, can_channel: str, can_option: tu
             source = Source(f"{replay.name} (replay)", recording.interface, recording=recording)
         elif can_interface is not None:
             address = BusAddress(can_interface, can_channel, dict(can_option))
-            channel = None if bench is None else Channel(*bench)
+            channel = None if bench is None else Channel.greeted(*bench)
             source = Source(f"{can_interface} {can_channel}", interface, address, channel, firmware=firmware)
         else:
             ecu = stack.enter_context(VirtualEcu(built.vecu))

@@ -122,7 +122,7 @@ def scope(motor: str, can_interface: str | None, can_channel: str, can_option: t
             address, channel = BusAddress("socketcand", "can0", options), Channel(HOST, ecu.bench_port)
         else:
             address = BusAddress(can_interface, can_channel, dict(can_option))
-            channel = None if bench is None else Channel(*bench)
+            channel = None if bench is None else Channel.greeted(*bench)
         connected = Scope(XcpMaster(_line(address, channel, stack)), description)
         capture = connected.read() if setup is None else _capture(connected, setup, seconds)
         if csv is not None:

@@ -221,7 +221,8 @@ class Scope:
             if status.state in ("done", "idle"):
                 return status
             if waited_s >= seconds:
-                raise FluxtrueError(f"no complete capture within {seconds:g} s (the scope is {status.state})")
+                missing = ": the trigger has not come" if status.state == "armed" else ""
+                raise FluxtrueError(f"no complete capture within {seconds:g} s (the scope is {status.state}{missing})")
             self._master.pass_time(POLL_S)
             waited_s += POLL_S
 

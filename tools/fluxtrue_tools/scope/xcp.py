@@ -59,13 +59,22 @@ class WallLine:
 
     def exchange(self, frame: can.Message) -> bytes:
         """One command and its answer."""
+        try:
+            answer = self._answer(frame)
+        except (can.CanError, OSError) as error:
+            raise FluxtrueError(f"the bus is lost: {str(error).splitlines()[0]}") from None
+        if answer is not None:
+            return answer
+        raise FluxtrueError(f"XCP: no answer within {ANSWER_S:g} s: is the ECU on this bus?")
+
+    def _answer(self, frame: can.Message) -> bytes | None:
         self._bus.send(frame)
         end_s = time.monotonic() + ANSWER_S
         while (left_s := end_s - time.monotonic()) > 0.0:
             message = self._bus.recv(left_s)
             if message is not None and is_answer(message):
                 return bytes(message.data)
-        raise FluxtrueError(f"XCP: no answer within {ANSWER_S:g} s: is the ECU on this bus?")
+        return None
 
     def pass_time(self, seconds: float) -> None:
         """Wait."""

@@ -9,6 +9,7 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.kinds import Address
 
 TIMEOUT_S = 600.0  # only ends a hang; the duration of a run is not limited
+GREETING_S = 10.0  # for the first answer
 
 
 class BenchRefused(FluxtrueError):
@@ -30,7 +31,21 @@ class Channel:
     @classmethod
     def at(cls, address: str, option: str) -> "Channel":
         """A connection to HOST:PORT, the value of a command line's option."""
-        return cls(*Address().read(address, option))
+        return cls.greeted(*Address().read(address, option))
+
+    @classmethod
+    def greeted(cls, host: str, port: int) -> "Channel":
+        """A connection to an address that a user has given; a port on which no bench answers is refused."""
+        channel = cls(host, port)
+        channel._socket.settimeout(GREETING_S)
+        try:
+            channel.ask("hello")
+        except (FluxtrueError, OSError, ValueError):
+            channel.close()
+            raise FluxtrueError(f"bench channel {host}:{port}: no bench answers there; wanted: the bench port of a "
+                                "virtual ECU, not its CAN port") from None  # fmt: skip
+        channel._socket.settimeout(TIMEOUT_S)
+        return channel
 
     def __init__(self, host: str, port: int, timeout_s: float = TIMEOUT_S) -> None:
         self._address = host, port

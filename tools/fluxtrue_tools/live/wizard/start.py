@@ -42,7 +42,7 @@ def _waits(bench: on_the_bus.Bench) -> bool:
     """Whether its time passes only when it is asked to."""
     if bench.channel is None:
         return False
-    with contextlib.closing(Channel(*bench.channel)) as channel:
+    with contextlib.closing(Channel.greeted(*bench.channel)) as channel:
         return channel.is_fast()
 
 
