@@ -62,6 +62,8 @@ def test_dead_time_that_moves_a_small_inductance_by_much_is_doubted(write: Write
     found = doubts.of_motor(load_motor(write(machine={"ld_H": 80e-6, "torque_max_Nm": 120.0})))
     assert [text for text in found if "move the current by 3.5 % of i_max_A in one PWM period" in text] == found
     assert len(found) == 1
+    near = doubts.of_motor(load_motor(write(machine={"ld_H": 92.8e-6, "torque_max_Nm": 120.0})))
+    assert "move the current by 3.02 % of i_max_A" in near[0], "not 3 %, which is allowed"
     assert doubts.of_motor(load_motor(write(machine={"ld_H": 100e-6, "torque_max_Nm": 120.0}))) == []
 
 

@@ -55,6 +55,19 @@ def test_what_cannot_be_built_is_refused(tmp_path: Path, capsys: pytest.CaptureF
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_guess_that_is_refused_is_said_to_be_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """At 3 rpm the magnet that balances 2000 V is so large that even a tenth of its inductance is 368 H."""
+    slow = ["--i-max", "3", "--vdc", "2000", "--pwm", "4", "--pole-pairs", "1", "--speed-max", "3"]
+    assert run(["motor", "start", *slow, "--out", str(tmp_path / "m")]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("error: nameplate: machine.ld_H = 367.6 H, allowed: ") and "guessed from --i-max" in said
+    fast = [*UNKNOWN[:-1], "200000"]
+    assert run(["motor", "start", *fast, "--out", str(tmp_path / "m")]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("error: nameplate: machine.speed_max_rpm = ") and "guessed" not in said
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_guesses_replace_guesses_but_no_other_motor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "m" / "motor.toml"
     assert run(["motor", "start", *UNKNOWN, "--out", str(tmp_path / "m")]) == 0

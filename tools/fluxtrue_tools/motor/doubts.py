@@ -133,7 +133,7 @@ def _dead_time(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
     if moved_A > DEAD_TIME_MOST * i_max_A:
         share = 100.0 * moved_A / i_max_A
         yield Doubt(f"inverter.dead_time_s = {inverter.dead_time_s:g} s and device_drop_V = "
-                    f"{inverter.device_drop_V:g} V move the current by {share:.2g} % of i_max_A in one PWM period "
+                    f"{inverter.device_drop_V:g} V move the current by {share:.3g} % of i_max_A in one PWM period "
                     f"(allowed without a warning: {100 * DEAD_TIME_MOST:g} %): near zero current it may oscillate; "
                     "shorten the dead time")  # fmt: skip
 

@@ -70,14 +70,17 @@ def _check_free(out: Path) -> None:
         raise FluxtrueError(f"--out {out}: has a {FILE_NAME} that is not of motor start, allowed: another folder")
 
 
-def _check(staging: Path) -> None:
-    """What motor build would refuse is refused here."""
+def _check(staging: Path, guessed: list[str]) -> None:
+    """What motor build would refuse is refused here; a key that the user has not given is said to be guessed."""
     from fluxtrue_tools.motor.motor import load_motor
 
     try:
         load_motor(staging)
     except FluxtrueError as error:  # its file is in a folder that the user never sees
-        raise FluxtrueError(str(error).replace(f"{staging / FILE_NAME}: ", "nameplate: ")) from None
+        said = str(error).replace(f"{staging / FILE_NAME}: ", "nameplate: ")
+        if any(said.startswith(f"nameplate: machine.{key} ") for key in guessed):
+            said += "; guessed from --i-max, --vdc, --pole-pairs and --speed-max, of which one is unlikely"
+        raise FluxtrueError(said) from None
 
 
 @click.command("start", cls=paths.Command)
@@ -87,7 +90,8 @@ def _check(staging: Path) -> None:
 @click.option("--vdc", required=True, type=kinds.Finite(min=5.0, max=2000.0), metavar="V", help="Dc voltage.")
 @click.option("--pwm", required=True, type=kinds.Finite(min=4.0, max=40.0), metavar="kHz", help="PWM frequency.")
 @click.option("--pole-pairs", required=True, type=click.IntRange(1, 50), help="Not measured yet.")
-@click.option("--speed-max", type=kinds.Finite(min=1.0, max=200000.0), metavar="rpm", help="Largest speed.")
+@click.option("--speed-max", type=kinds.Finite(min=1.0, max=200000.0), metavar="rpm",
+              help="Largest speed.  [default: guessed]")  # fmt: skip
 @click.option("--full-scale", type=kinds.Finite(min=0.1, max=10000.0), metavar="A",
               help="Range of the current measurement.  [default: 1.5 i_max]")  # fmt: skip
 def start(out: Path, i_max: float, vdc: float, pwm: float, pole_pairs: int, speed_max: float | None,
@@ -97,12 +101,11 @@ def start(out: Path, i_max: float, vdc: float, pwm: float, pole_pairs: int, spee
 
     _check_free(out)
     data = guess(i_max, vdc, 1e3 * pwm, pole_pairs, speed_max)
+    guessed = [key for key in data if key != SPEED or speed_max is None]
     with paths.outputs() as outputs:
         staging = outputs.scratch(out)
         wanted = text(name_from(out), i_max, vdc, 1e3 * pwm, pole_pairs, full_scale or FULL_SCALE_PER_I_MAX * i_max,
                       data, speed_max is not None)  # fmt: skip
         (staging / FILE_NAME).write_text(wanted, encoding="utf-8")
-        _check(staging)
-    click.echo(f"nameplate written to {out}; guessed: "
-               + ", ".join(f"{key} = {value:g}" for key, value in data.items()
-                           if key != SPEED or speed_max is None))  # fmt: skip
+        _check(staging, guessed)
+    click.echo(f"nameplate written to {out}; guessed: " + ", ".join(f"{key} = {data[key]:g}" for key in guessed))
