@@ -287,6 +287,8 @@ def test_keys_that_need_another_one_are_refused(write: Write, magnet: dict[str, 
         (HALF, scaled(saturating, q_factor=-1.0),
          "psi_q_Vs does not rise with iq_A from id_A = -300, iq_A = 0 (line 2) to id_A = -300, iq_A = 100 (line 3); "
          "everywhere: its sign is the other way round, wanted: psi_q_Vs rising with iq_A"),
+        (HALF, scaled(straight, q_factor=0.0),
+         "to id_A = -300, iq_A = 100 (line 3); it is the same everywhere; wanted: positive incremental inductances"),
         ([-300.0, -200.0, -100.0, 0.0], scaled(saturating, q_factor=-1.0),
          "from id_A = -300, iq_A = 0 (line 5) to id_A = -300, iq_A = -100 (line 4); everywhere: its sign"),
         (HALF, lambda d, q: (0.084 + 0.2e-3 * d, 0.5e-3 * q if q < 300 or d > -300 else 0.01),

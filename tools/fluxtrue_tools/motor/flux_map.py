@@ -209,14 +209,15 @@ def _place(grid: _Grid, i_d: float, i_q: float) -> str:
 
 def _check_rising(path: Path, grid: _Grid, iq: Array, name: str, psi: Array, axis: int) -> None:
     """Refuse a flux that falls while its own current rises, and name the place in the file."""
-    falls = np.diff(psi, axis=axis) <= 0
+    steps = np.diff(psi, axis=axis)
+    falls = steps <= 0
     if not falls.any():
         return
     k, j = np.argwhere(falls)[0]
     current = "id_A" if axis == 0 else "iq_A"
     here, there = (grid.id_A[k], iq[j]), (grid.id_A[k + (axis == 0)], iq[j + (axis == 1)])
     sign = f"; everywhere: its sign is the other way round, wanted: {name} rising with {current}"
-    turned = sign if falls.all() else ""
+    turned = sign if np.all(steps < 0) else "; it is the same everywhere" if not steps.any() else ""
     raise FluxtrueError(
         f"{path}: {name} does not rise with {current} from {_place(grid, *here)} to "
         f"{_place(grid, *there)}{turned}; wanted: positive incremental inductances everywhere"
