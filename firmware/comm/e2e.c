@@ -3,7 +3,7 @@
 
 #define COUNTER_MASK 0x0FU
 
-/* The remainder of each byte by the polynomial 0x1D; a test computes them bit by bit. */
+/* The remainder of each byte divided by the polynomial 0x1D; a test computes all of them bit by bit. */
 /* clang-format off */
 static const uint8_t remainder_of[256] = {
     0x00, 0x1D, 0x3A, 0x27, 0x74, 0x69, 0x4E, 0x53, 0xE8, 0xF5, 0xD2, 0xCF, 0x9C, 0x81, 0xA6, 0xBB,

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import types
 from collections.abc import Callable
+from pathlib import Path
 
 import click
 import pytest
@@ -50,6 +51,19 @@ def test_a_command_that_returns_nothing_exits_with_0(command) -> None:
 def test_a_command_chooses_its_exit_code(command) -> None:
     command(lambda: 3)
     assert cli.run(["probe"]) == 3
+
+
+def test_a_missing_program_is_named_with_its_remedy(command, capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "/nonexistent")
+    command(lambda: subprocess.run(["cmake", "--version"], check=False))
+    assert cli.run(["probe"]) == 2
+    assert capsys.readouterr().err == "error: cmake not found: install it or run tools/setup\n"
+
+
+def test_a_file_that_the_system_refuses_is_named_with_the_reason(command, capsys) -> None:
+    command(lambda: Path("missing.csv").read_text(encoding="utf-8"))
+    assert cli.run(["probe"]) == 2
+    assert capsys.readouterr().err == "error: missing.csv: No such file or directory\n"
 
 
 def test_our_error_is_one_line_even_if_its_text_is_not(command, capsys) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import click
 
-from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.errors import FluxtrueError, of_system
 from fluxtrue_tools.version import in_checkout, version
 
 # Name: (module, command in it, one line for --help). Importing them all would cost a second.
@@ -133,5 +133,5 @@ def run(arguments: Sequence[str]) -> int:
     except OSError as error:  # the system's word on a path that no command has foreseen
         if error.filename is None:
             raise
-        click.echo(f"error: {os.fsdecode(error.filename)}: {error.strerror}", err=True)
+        click.echo(f"error: {of_system(error)}", err=True)
         return EXIT_ERROR

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The exception for errors that a user can correct."""
+"""The exception for errors that a user can correct, and the words for those of the system."""
+
+import os
 
 
 class FluxtrueError(Exception):
@@ -11,3 +13,12 @@ class FluxtrueError(Exception):
 
     def __str__(self) -> str:
         return " ".join(super().__str__().split())
+
+
+def of_system(error: OSError) -> str:
+    """The system's complaint without Python's number: a program that is missing, or a file with the reason."""
+    if error.filename is None:
+        return error.strerror or str(error)
+    name = os.fsdecode(error.filename)
+    is_program = isinstance(error, FileNotFoundError) and os.sep not in name and "." not in name
+    return f"{name} not found: install it or run tools/setup" if is_program else f"{name}: {error.strerror}"

@@ -111,9 +111,13 @@ def test_the_report_has_its_plots_and_a_build_without_it_removes_the_old_ones(wr
     assert names(out) == PLAIN | {"plot_of_the_user.png"}
 
 
-def test_without_a_simulation_the_report_says_why_and_draws_the_model_only(write, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("error", "why"), [
+    (FluxtrueError("cc: not found"), "cc: not found"),
+    (FileNotFoundError(2, "No such file or directory", "cmake"), "cmake not found: install it or run tools/setup"),
+])  # fmt: skip
+def test_without_a_simulation_the_report_says_why_and_draws_the_model_only(write, tmp_path, monkeypatch, error, why):
     def fails(*_):
-        raise FluxtrueError("cc: not found")
+        raise error
 
     monkeypatch.setattr("fluxtrue_tools.motor.measured.simulated", fails)
     out = tmp_path / "out"
@@ -122,7 +126,7 @@ def test_without_a_simulation_the_report_says_why_and_draws_the_model_only(write
     build(write(), out, report=True)
     assert not (out / "plot_steps.png").exists() and (out / "plot_current_loop.png").exists()
     text = (out / "report.txt").read_text(encoding="utf-8")
-    assert "not measured       current loop: cc: not found" in text and "measured by injection" not in text
+    assert f"not measured       current loop: {why}" in text and "measured by injection" not in text
     assert "plot_steps.png" not in (out / "report.html").read_text(encoding="utf-8")
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.errors import FluxtrueError, of_system
 from fluxtrue_tools.motor.current_loop import Response
 from fluxtrue_tools.motor.current_steps import Step, steps
 from fluxtrue_tools.motor.injection import measure
@@ -40,7 +40,7 @@ def measure_loop(motor: Motor) -> Measured:
         try:
             drive = simulated(motor, Path(folder))
         except (FluxtrueError, OSError) as error:
-            found.missing.append(f"current loop: {error}")
+            found.missing.append(f"current loop: {of_system(error) if isinstance(error, OSError) else error}")
             return found
         for speed, inductance in _each(LOOP_SPEEDS, LOOP_INDUCTANCES):
             try:
