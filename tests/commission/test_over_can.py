@@ -6,9 +6,20 @@ import re
 import pytest
 from click.testing import CliRunner
 
-from fluxtrue_tools.commission.over_can import main
+from fluxtrue_tools.commission.over_can import main, score_text, turned_text
+from fluxtrue_tools.commission.score import Score, Turned
 
 R_PERCENT = 1.0
+
+
+def test_the_errors_are_printed_in_the_units_of_the_page() -> None:
+    found = score_text(Score(0.00304, 0.0173, 0.0012))
+    assert found == ("map: 0.30 % rms, 1.73 % at worst, of the largest flux linkage; its torque 0.12 % rms of the "
+                     "largest")  # fmt: skip
+    said = turned_text(Turned(True, -0.0594, 0.0011, -0.004, 0.005, 0.002))
+    assert said == ("connection: right; offset -0.059 degrees; psi_f beyond the gain of the dc voltage +0.11 %; "
+                    "inertia -0.4 %; drag 0.5 % rms")  # fmt: skip
+    assert turned_text(Turned(False, 0.0, 0.0, 0.0, 0.0, 0.0)).startswith("connection: WRONG")
 
 
 @pytest.mark.parametrize(("steps", "connected"), [("resistance", True), ("offsets,phases", False)])

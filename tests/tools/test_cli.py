@@ -53,6 +53,22 @@ def test_a_command_chooses_its_exit_code(command) -> None:
     assert cli.run(["probe"]) == 3
 
 
+@pytest.mark.parametrize("wrong", [("--machine", "nope"), ("--step", "nope"), ("--nonsense", "1")])
+def test_a_module_with_a_command_line_of_its_own_ends_with_one_line(wrong: tuple[str, str]) -> None:
+    module = [sys.executable, "-m", "fluxtrue_tools.commission.over_can", *wrong]
+    done = subprocess.run(module, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: ") and wrong[0] in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_every_module_with_a_command_line_of_its_own_ends_like_the_commands() -> None:
+    """Modules whose main() is a click command; __main__ and programs of the build have another main()."""
+    texts = {path: path.read_text(encoding="utf-8") for path in Path(cli.__file__).parent.rglob("*.py")}
+    own = {path for path, text in texts.items() if "@click.command()" in text and '__name__ == "__main__"' in text}
+    assert len(own) >= 9
+    assert [path for path in own if not texts[path].endswith("    run_module(main)\n")] == []
+
+
 def test_a_missing_program_is_named_with_its_remedy(command, capsys, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "/nonexistent")
     command(lambda: subprocess.run(["cmake", "--version"], check=False))

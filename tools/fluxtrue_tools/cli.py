@@ -4,7 +4,8 @@
 import importlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import NoReturn
 
 import click
 
@@ -113,8 +114,18 @@ def _broken_pipe() -> int:
 
 def run(arguments: Sequence[str]) -> int:
     """Run one command and turn its outcome into an exit code."""
+    return _outcome(lambda: main.main(args=list(arguments), prog_name="fluxtrue", standalone_mode=False))
+
+
+def run_module(command: click.Command) -> NoReturn:
+    """The same for a command that is a module of its own: python -m fluxtrue_tools.<module>."""
+    sys.exit(_outcome(lambda: command.main(standalone_mode=False)))
+
+
+def _outcome(call: Callable[[], object]) -> int:
+    """The exit code of a command, with one line for what a user can correct."""
     try:
-        result = main.main(args=list(arguments), prog_name="fluxtrue", standalone_mode=False)
+        result = call()
         sys.stdout.flush()
         return result if isinstance(result, int) else 0
     except click.exceptions.NoArgsIsHelpError as error:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import click
 
+from fluxtrue_tools.cli import run_module
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.outputs import write_text
 
@@ -80,4 +81,4 @@ def main(check: bool) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_module(main)

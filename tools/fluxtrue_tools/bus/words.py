@@ -20,6 +20,7 @@ import click
 
 from fluxtrue_tools.bus import DBC
 from fluxtrue_tools.bus.scales import with_hash
+from fluxtrue_tools.cli import run_module
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.outputs import write_text
 
@@ -210,4 +211,4 @@ def main(check: bool) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_module(main)

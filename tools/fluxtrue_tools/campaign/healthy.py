@@ -20,6 +20,7 @@ from typing import Any, Final
 
 import click
 
+from fluxtrue_tools.cli import run_module
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.outputs import write_text
 
@@ -129,4 +130,4 @@ def main(names: tuple[str, ...], seconds: float, seed: int, write: bool) -> None
 
 
 if __name__ == "__main__":
-    main()
+    run_module(main)

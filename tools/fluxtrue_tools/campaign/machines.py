@@ -19,6 +19,7 @@ import click
 from fluxtrue_tools.campaign import spec
 from fluxtrue_tools.campaign.machine import data_sheet
 from fluxtrue_tools.campaign.steps import OVERSHOOT_MAX, Step, steps, worst
+from fluxtrue_tools.cli import run_module
 from fluxtrue_tools.outputs import write_text
 from fluxtrue_tools.sim.build import prepare
 
@@ -134,4 +135,4 @@ def main(names: tuple[str, ...], cases: int, write: bool) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_module(main)

@@ -15,6 +15,7 @@ from pathlib import Path
 import click
 import numpy as np
 
+from fluxtrue_tools.cli import run_module
 from fluxtrue_tools.commission import hidden, proof
 from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.score import balance_error, resistance_error, score, turned
@@ -126,4 +127,4 @@ def _scored(folder: Path, drawn: list[tuple[str, int]], turning: bool, other_err
 
 
 if __name__ == "__main__":
-    main()
+    run_module(main)

@@ -16,6 +16,7 @@ from typing import Any
 import click
 import pandas as pd
 
+from fluxtrue_tools.cli import run_module
 from fluxtrue_tools.commission import driven, proof
 from fluxtrue_tools.commission.campaign import FOLDER, draw
 from fluxtrue_tools.commission.hidden import Truth
@@ -84,4 +85,4 @@ def main(machines: int, drive_s: float, out: Path) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_module(main)

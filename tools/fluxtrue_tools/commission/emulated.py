@@ -14,6 +14,7 @@ from pathlib import Path
 
 import click
 
+from fluxtrue_tools.cli import run_module
 from fluxtrue_tools.commission import hidden, on_the_bus
 from fluxtrue_tools.commission.bus import OverTheBus
 from fluxtrue_tools.commission.campaign import FOLDER
@@ -61,9 +62,11 @@ def connected(made: Parts, name: str, seed: int) -> Iterator[tuple[OverTheBus, T
 @click.option("--step", "steps", default="all", show_default=True, help="As of `tools/fluxtrue commission`.")
 def main(machine: str, seed: int, steps: str) -> None:
     """Measure the machine and print the errors."""
+    wanted = chosen(tuple(steps.split(",")))
+    hidden.folder_of(machine)  # refuses an unknown one before anything is built
     with connected(parts(), machine, seed) as (drive, truth, known):
-        measure(drive, truth, known, chosen(tuple(steps.split(","))))
+        measure(drive, truth, known, wanted)
 
 
 if __name__ == "__main__":
-    main()
+    run_module(main)

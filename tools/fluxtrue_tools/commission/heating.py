@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 import click
 import numpy as np
 
+from fluxtrue_tools.cli import run_module
 from fluxtrue_tools.commission import hidden
 from fluxtrue_tools.commission.campaign import FOLDER, KINDS, MOTORS, NAMEPLATES, draw
 from fluxtrue_tools.commission.cli import nameplate_of
@@ -82,4 +83,4 @@ def main(machines: int, nameplate: str) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_module(main)

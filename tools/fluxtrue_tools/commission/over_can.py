@@ -11,15 +11,37 @@ import time
 
 import click
 
+from fluxtrue_tools.cli import run_module
 from fluxtrue_tools.commission import hidden, on_the_bus
 from fluxtrue_tools.commission.bus import OverTheBus
 from fluxtrue_tools.commission.campaign import FOLDER
 from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.hidden import Truth
 from fluxtrue_tools.commission.nameplate import Nameplate
-from fluxtrue_tools.commission.score import harmonics_deg, resistance_error, score, turned, waves_rad
+from fluxtrue_tools.commission.score import (
+    Score,
+    Turned,
+    harmonics_deg,
+    resistance_error,
+    score,
+    turned,
+    waves_rad,
+)
 from fluxtrue_tools.commission.steps import Step, chosen, run
 from fluxtrue_tools.sim import motor as motors
+
+
+def score_text(found: Score) -> str:
+    """The errors of the map."""
+    return (f"map: {100.0 * found.map_rms:.2f} % rms, {100.0 * found.map_worst:.2f} % at worst, of the largest flux "
+            f"linkage; its torque {100.0 * found.torque_rms:.2f} % rms of the largest")  # fmt: skip
+
+
+def turned_text(found: Turned) -> str:
+    """The errors of the steps that turn the shaft."""
+    return (f"connection: {'right' if found.is_connected else 'WRONG'}; offset {found.offset_deg:+.3f} degrees; "
+            f"psi_f beyond the gain of the dc voltage {100.0 * found.psi_f:+.2f} %; inertia "
+            f"{100.0 * found.inertia:+.1f} %; drag {100.0 * found.drag:.1f} % rms")  # fmt: skip
 
 
 def measure(drive: OverTheBus, truth: Truth, known: Nameplate, steps: list[Step]) -> None:
@@ -35,13 +57,13 @@ def measure(drive: OverTheBus, truth: Truth, known: Nameplate, steps: list[Step]
         click.echo(f"harmonics of the angle sensor: wrong by {harmonics_deg(found.spun, truth):.4f} degrees, true: "
                    f"{true} degrees")  # fmt: skip
     if found.drag is not None:
-        click.echo(str(turned(found, truth)))
+        click.echo(turned_text(turned(found, truth)))
     if found.resistance is not None:
         whole, beyond = resistance_error(found.resistance.r_ohm, truth)
         click.echo(f"resistance: {100.0 * whole:+.2f} %, beyond the sensors' gains {100.0 * beyond:+.2f} %")
     if found.surface is not None:
         psi_f_Vs = found.spun.psi_f_Vs if found.spun is not None else truth.psi_f_Vs
-        click.echo(str(score(found.surface.model, truth, known.i_max_A, psi_f_Vs)))
+        click.echo(score_text(score(found.surface.model, truth, known.i_max_A, psi_f_Vs)))
 
 
 @click.command()
@@ -52,6 +74,7 @@ def measure(drive: OverTheBus, truth: Truth, known: Nameplate, steps: list[Step]
 def main(machine: str, seed: int, steps: str, other_errors: bool) -> None:
     """Measure the machine and print the errors."""
     wanted = chosen(tuple(steps.split(",")))
+    hidden.folder_of(machine)  # refuses an unknown one before anything is built
     as_assumed = all(step.name != "phases" for step in wanted)
     motor = motors.load(str(FOLDER))
     known = nameplate_of(FOLDER, motor)
@@ -62,4 +85,4 @@ def main(machine: str, seed: int, steps: str, other_errors: bool) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_module(main)
