@@ -93,7 +93,7 @@ def test_without_any_target_it_says_what_it_wants(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("arguments", "wanted"), [
     (("--can-interface=nonsense",), 'error: --can-interface nonsense, --can-channel can0: Unknown interface type'),
-    (("--can-interface=socketcand",), "error: --can-interface socketcand, --can-channel can0: "),
+    (("--can-interface=socketcand",), "error: --can-interface socketcand: missing: --can-option host="),
     (("--can-interface=kvaser", "--can-channel=0"), "error: --can-interface kvaser, --can-channel 0: "),
     (("--can-interface=virtual", "--can-option=bitrate"), "error: --can-option bitrate: allowed: NAME=VALUE"),
     (("--can-interface=virtual", "--bench=here"), "error: --bench here: allowed: HOST:PORT"),
