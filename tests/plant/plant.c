@@ -11,6 +11,7 @@
 #include <string.h>
 
 #define TWO_PI 6.28318530717958647693
+#define LATCHED_PERIODS 2 /* the drivers' line is active at the first sample; what the second enables acts thereafter */
 
 struct plant {
     plant_params_t params;
@@ -23,6 +24,7 @@ struct plant {
     plant_switches_t on;
     double link_V; /* of the capacitor */
     int gate_fault;
+    int latched;        /* periods in which no controller could have enabled switching again */
     int hardware_short; /* held by the board */
     plant_truth_t truth;
 };
@@ -242,7 +244,17 @@ static double short_circuit(plant_t *plant, bridge_t *bridge)
         return p->short_circuit_A * on_s * p->pwm_hz;
     }
     bridge->switching = 0;
+    plant->latched = LATCHED_PERIODS;
     return p->short_circuit_A * fmax(p->desaturation_s * p->pwm_hz, inverter_short_circuit(p, bridge->duty, 0));
+}
+
+/* An imposed state finds the timer's latch as a controller would (PL-31); a controller's gates come with it. */
+static int switching(plant_t *plant, int gates_on, double duty[3])
+{
+    const plant_params_t *p = &plant->params;
+    const int is_latched = plant->latched > 0 && p->imposed_bridge != PLANT_BRIDGE_OBEYS;
+    plant->latched -= plant->latched > 0;
+    return inverter_gates(p, gates_on && plant->on.gate_supply, duty) && !is_latched;
 }
 
 /* Held for the period in the stationary frame, as the voltage of the duties is. */
@@ -262,7 +274,7 @@ void plant_advance(plant_t *plant, const double wanted[3], int gates_on)
     const double middle_s = plant->truth.time_s + 0.5 * period_s;
     const int b = p->phases_swapped ? 2 : 1;
     double duty[3] = {wanted[0], wanted[b], wanted[3 - b]};
-    bridge_t bridge = {duty, inverter_gates(p, gates_on && plant->on.gate_supply, duty), vdc_at(p, middle_s), 0.0};
+    bridge_t bridge = {duty, switching(plant, gates_on, duty), vdc_at(p, middle_s), 0.0};
     bridge.short_circuit_A = short_circuit(plant, &bridge);
     double vdc_V = bridge_V(plant, middle_s);
     energy_t sum = {0};

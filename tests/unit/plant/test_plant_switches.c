@@ -343,6 +343,36 @@ void test_gate_drivers_that_block_leave_only_switching_disabled(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, cabs(t->i_d_A + I * t->i_q_A - off));
 }
 
+/* The drivers' line is active at the next sample; what enables switching at the one after that acts in the third period.
+ * Until then the imposed state is the one without switching; from then on it makes another current. */
+static double complex imposed_after_a_report(int imposed, int periods)
+{
+    const double upper[3] = {1.0, 1.0, 1.0};
+    plant_destroy(plant);
+    const plant_truth_t *t = start();
+    plant_switch(plant, &(plant_switches_t){.contactor = 1, .gate_supply = 1});
+    plant_set_state(plant, -80.0, 60.0, 0.4, 400.0);
+    plant_advance(plant, upper, 1);
+    TEST_ASSERT_TRUE(reported());
+    plant_params(plant)->imposed_bridge = imposed;
+    for (int k = 0; k < periods; k++) {
+        plant_advance(plant, half, 1);
+    }
+    return t->i_d_A + I * t->i_q_A;
+}
+
+void test_an_imposed_state_begins_no_earlier_than_the_fault_line_lets_a_controller_begin(void)
+{
+    p.speed_rad_s = 400.0;
+    p.switch_shorted[LOWER_A] = 1;
+    for (int periods = 1; periods < 4; periods++) {
+        const double complex off = imposed_after_a_report(PLANT_BRIDGE_OFF, periods);
+        const double change_A = cabs(imposed_after_a_report(PLANT_BRIDGE_LOWER_ON, periods) - off);
+        TEST_ASSERT_EQUAL(periods > 2, change_A > 1.0);
+        TEST_ASSERT_TRUE(periods > 2 || change_A == 0.0);
+    }
+}
+
 /* The board's switches stay as they were when the state was imposed. */
 void test_with_an_imposed_state_of_the_bridge_the_contactor_does_not_move(void)
 {
