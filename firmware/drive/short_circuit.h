@@ -13,9 +13,10 @@
  *   After a fault the currents may have any value, and a short circuit would rotate their flux about the origin. For
  *   half a step of the task switching is therefore disabled first, and the dc link opposes the currents. This wait is
  *   left out after an over-voltage, which the energy of the currents would raise, and after faults that leave control
- *   intact: then the currents have been moved before. After a gate fault it ends once the side is known, a current
- *   flows, or two periods have passed since the period of the fault.
- * Source   docs/theory/safe-state.md (SS-11), (SS-20), (SS-21), (SS-30)
+ *   intact: then the currents have been moved before. After the faults of a phase (types/faults.h) it ends where the
+ *   flux of the tables is smaller than that of the magnets, to which the wait would raise it. After a gate fault it
+ *   ends once the side is known, a current flows, or two periods have passed since the period of the fault.
+ * Source   docs/theory/safe-state.md (SS-11), (SS-20), (SS-21), (SS-30), (SS-31)
  * Units    PWM periods
  * Range    up to 255 periods of waiting
  * Errors   none: if the drivers end the short circuit on both sides, switching stays disabled
@@ -34,8 +35,8 @@ void short_circuit_prepare(fast_state_t *fast, uint32_t periods);
 /** Whether switching stays disabled in this period, before the short circuit; called once per period. */
 bool short_circuit_waits(fast_state_t *fast);
 
-/** The same with the search for a shorted switch, which may end the wait; rotation: cosine, sine of the sample's angle.
- * Called once per period of a fault in place of short_circuit_waits(). */
+/** The same with what may end the wait: the search for a shorted switch, or a small flux. rotation: cosine, sine of the
+ * sample's angle. Called once per period of a fault in place of short_circuit_waits(). */
 bool short_circuit_may_begin(drive_t *drive, const sample_t *sample, fx_pair_t rotation);
 
 /** Ends the short circuit: switching is disabled, and the duties are one half. */

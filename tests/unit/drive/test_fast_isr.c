@@ -692,6 +692,64 @@ void test_a_short_circuit_waits_for_the_search_for_a_shorted_switch_if_it_waits_
     expect_found(&given, true, 0);
 }
 
+typedef struct {
+    uint32_t faults;
+    int32_t psi_d, psi_q, psi_d_error;
+    dq_q15_t i;
+    int32_t zero_q28;
+} waiting_t;
+
+static bool begins_at_once(const waiting_t *given)
+{
+    seam_start();
+    drive.psi_d_error = (q15_t)given->psi_d_error;
+    drive.fast.short_circuit.waits = 5;
+    drive.fast.faults = given->faults;
+    const sample_t sample = {.point = {.i = given->i, .flux = {.psi_d = given->psi_d, .psi_q = given->psi_q}},
+                             .zero_q28 = given->zero_q28,
+                             .v_dc = V_DC};
+    return short_circuit_may_begin(&drive, &sample, fx_pair(32767, 0));
+}
+
+/* The wait would raise a smaller flux to that of the magnets. */
+void test_a_short_circuit_begins_at_once_with_less_flux_than_that_of_the_magnets(void)
+{
+    const int32_t psi_f = motor.safe_state.psi_f;
+    const waiting_t less[] = {
+        {.faults = FAULT_CONTROL, .psi_d = psi_f - 1},
+        {.faults = FAULT_PHASE_LOST, .psi_q = 1 - psi_f},
+        {.faults = FAULT_CONTROL | FAULT_PHASE_LOST, .psi_d = psi_f / 2, .psi_q = psi_f / 2, .i = {-20480, 0}},
+        {.faults = FAULT_CONTROL, .psi_d = psi_f + 99, .psi_d_error = -100},
+    };
+    const waiting_t not_less[] = {
+        {.faults = FAULT_CONTROL, .psi_d = psi_f},
+        {.faults = FAULT_CONTROL, .psi_q = -psi_f},
+        {.faults = FAULT_CONTROL, .psi_d = psi_f / 4 * 3, .psi_q = psi_f / 4 * 3},
+        {.faults = FAULT_CONTROL, .psi_d = psi_f - 100, .psi_d_error = 100},
+    };
+    for (unsigned k = 0; k < 4U; k++) {
+        TEST_ASSERT_TRUE(begins_at_once(&less[k]));
+        TEST_ASSERT_FALSE(begins_at_once(&not_less[k]));
+    }
+}
+
+/* After every other fault the samples may be wrong; the tables end at the largest current, 20480. */
+void test_a_short_circuit_waits_where_its_flux_is_not_known(void)
+{
+    const waiting_t known = {.faults = FAULT_CONTROL};
+    TEST_ASSERT_TRUE(begins_at_once(&known));
+    for (unsigned bit = 0; bit < 16U; bit++) {
+        const uint32_t fault = (uint32_t)1 << bit;
+        const bool is_at_once = fault == FAULT_OVER_VOLTAGE || fault == FAULT_CONTROL || fault == FAULT_PHASE_LOST;
+        const waiting_t given = {.faults = FAULT_CONTROL | fault};
+        TEST_ASSERT_EQUAL(is_at_once, begins_at_once(&given));
+    }
+    const waiting_t beyond = {.faults = FAULT_CONTROL, .i = {-20481, 0}};
+    const waiting_t no_sum = {.faults = FAULT_CONTROL, .zero_q28 = -547 * 8192};
+    TEST_ASSERT_FALSE(begins_at_once(&beyond));
+    TEST_ASSERT_FALSE(begins_at_once(&no_sum));
+}
+
 /* The first flux of a search is never that of an earlier one. */
 void test_while_the_bridge_runs_the_flux_of_an_earlier_search_is_discarded(void)
 {
