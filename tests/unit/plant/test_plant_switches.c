@@ -343,8 +343,8 @@ void test_gate_drivers_that_block_leave_only_switching_disabled(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, cabs(t->i_d_A + I * t->i_q_A - off));
 }
 
-/* The drivers' line is active at the next sample; what enables switching at the one after that acts in the third period.
- * Until then the imposed state is the one without switching; from then on it makes another current. */
+/* The drivers' line is active at the next sample; what enables switching at the one after that acts in the third
+ * period. Until then the imposed state is the one without switching; thereafter it makes another current. */
 static double complex imposed_after_a_report(int imposed, int periods)
 {
     const double upper[3] = {1.0, 1.0, 1.0};
