@@ -122,8 +122,9 @@ typedef struct {
 
 /** Values that a start has recalled (drive/recall.h). */
 typedef struct {
-    uint8_t agreed; /* updates in a row that agree with the values */
-    uint8_t trials; /* updates that could have confirmed them */
+    q15_t first_speed; /* at which updates first agreed with the values, negative while braking; 0: none have yet */
+    uint8_t agreed;    /* updates in a row that agree with the values */
+    uint8_t trials;    /* updates that could have confirmed them */
     bool unconfirmed;
 } recall_t;
 

@@ -79,6 +79,10 @@ def forgeries(dice: random.Random, honest: Record, other: Record) -> Iterator[tu
     shift = dice.uniform(-2.0, 2.0) * ONE_X  # magnet against d axis, q axis against angle
     opposed = [v + round(w * shift) for v, w in zip(x, (0, 0, 1, 1, -1, 1, 0), strict=True)]
     yield "opposed", ([max(-X_MAX, min(X_MAX, v)) for v in opposed], [ONE_P >> 14] * STATES, c)
+    # At 600 rpm and 60 N·m, the first point, the voltages of drop, magnet and q axis cancel.
+    shift = dice.uniform(-1.2, 1.2) * ONE_X
+    hidden = [v + round(w * shift) for v, w in zip(x, (0.0, -1.56, 1.0, 1.3, 0.0, 0.0, 0.0), strict=True)]
+    yield "hidden by the drop", (hidden, [ONE_P >> 12] * STATES, c)
     inverter = [dice.randint(0, 4096), dice.randint(1, (1 << 30) - 1), 1, dice.randint(-1000, 1000)]
     yield "inverter", (x, p, inverter)
 
