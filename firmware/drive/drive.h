@@ -151,6 +151,7 @@ typedef struct {
     identify_state_t identify;
     identification_t identification;   /* of the law that is chosen */
     volatile q15_t psi_d_error;        /* of the robust one: the fast ISR copies one half word */
+    uint16_t derating;                 /* DERATING_...: reasons for less than the requested torque */
     volatile uint32_t identifications; /* number of steps, by which a lower priority detects an inconsistent copy */
     current_reference_t reference;
     voltage_reserve_state_t voltage_reserve;
@@ -169,19 +170,18 @@ typedef struct {
     dq_q15_t psi_ref;            /* tables' flux at the last reference */
     rotating_flux_t rotating;    /* whose rotational voltage the target makes (CC-25) */
     dead_time_trim_state_t trim; /* of the compensation: added while driving */
-    uint16_t derating;           /* DERATING_...: reasons for less than the requested torque */
     q15_t torque_commanded;      /* the limited torque after slew */
     q15_t torque_corrected;      /* after the torque loop: input of the current reference */
     run_state_t run_state;
     uint8_t excessive; /* steps in a row with too much torque in field weakening; saturates */
     bool armed;        /* has run since the safe state was last freewheel: the bridge is powered */
+    recall_t recall;
     pulsing_t pulsing;
     movement_state_t movement;
     safe_state_state_t safe_state;
     gate_fault_state_t gate_fault;
     short_side_state_t short_side;
     switch_off_t switch_off;
-    recall_t recall;
     uint32_t fault_resets_asked;    /* of the request, as far as seen */
     uint32_t fault_resets;          /* passed on to the fast ISR */
     uint32_t identification_resets; /* of the request, as far as carried out by the task */
