@@ -99,7 +99,7 @@ def turned_by(i_d_A: float, offset_turns: float) -> np.ndarray:
 
 def test_a_whole_turn_of_the_shaft_has_no_harmonics() -> None:
     """All windows begin at the same angle, so that what one of them leaves is in the result."""
-    taken = [turned_by(level, 0.3) for level in spin.LEVELS]
+    taken = [spin.Window(turned_by(level, 0.3)) for level in spin.LEVELS]
     found = spin.magnet(taken, PERIOD_S, 0j, PAIRS)
     electrical = spin.magnet(taken, PERIOD_S, 0j, 1)
     print(found.error_rad, electrical.error_rad)

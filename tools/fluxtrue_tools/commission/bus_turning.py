@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The movements of the shaft over CAN: what the scope of the firmware captures in place of a record of every period.
 
-The scope's memory holds 0.12 s of five signals in every period, and reading it takes longer than the shaft coasts.
-Therefore each window is captured, the currents are brought to zero, and the shaft is accelerated again. The evaluation
-is that of software in the loop (connection.py, spin.py, drag.py).
+The scope's memory holds five signals of 1228 periods, 0.12 s at 10 kHz, and reading it takes longer than the shaft
+coasts. Therefore each window is captured, the currents are brought to zero, and the shaft is accelerated again. A level
+has every second period or fewer where a turn of the shaft takes longer. The evaluation is that of software in the loop
+(connection.py, spin.py, drag.py).
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final
@@ -16,7 +18,7 @@ from fluxtrue_tools.commission import connection, drag, spin, turning
 from fluxtrue_tools.commission.bus import OverTheBus
 from fluxtrue_tools.commission.harmonics import ORDERS, Coasting, Direction, fit
 from fluxtrue_tools.commission.nameplate import Nameplate
-from fluxtrue_tools.commission.spin import Magnet
+from fluxtrue_tools.commission.spin import Magnet, Window
 from fluxtrue_tools.commission.turning import Connection
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
@@ -30,6 +32,7 @@ SENSOR: Final = ("sensor_turns", "iq_A")
 ROWS: Final = WORDS // len(TAKEN)
 LEVEL_SETTLE_S: Final = 0.3
 OFF_SHARE: Final = 0.01  # of i_max: a mean current so far from the wanted one has not settled
+LEAST_RAD_S: Final = 0.1  # of a shaft that turns
 DIVISOR_DRAG: Final = 10  # 1 ms: the electrical angle may turn by less than half a turn between two samples
 
 
@@ -83,6 +86,14 @@ def _window(drive: OverTheBus, divisor: int, action: Callable[[float], None]) ->
     return np.column_stack((rows[:-1, :2], rows[1:, 2:4], rows[:-1, 4]))
 
 
+def _divisor(drive: OverTheBus) -> int:
+    """PWM periods from one row of a level to the next, so that a window has a whole turn of the shaft: over less the
+    harmonics of the angle sensor have a mean."""
+    turn_s = turning.TURN / max(abs(drive.shaft_rad_s()), LEAST_RAD_S)
+    wanted_s = min(spin.SHAFT_TURNS * turn_s, spin.LEVEL_MOST_S)
+    return max(math.ceil(wanted_s / (ROWS * drive.period_s)), 1)
+
+
 def direction(drive: OverTheBus, known: Nameplate, wanted_rad_s: float, rough: Connection) -> Magnet:
     """One direction with all levels of the current along d, each after an acceleration of its own."""
     turning.connect(drive, rough, known, spin.NAME)
@@ -94,8 +105,9 @@ def direction(drive: OverTheBus, known: Nameplate, wanted_rad_s: float, rough: C
             _accelerate(drive, known, wanted_rad_s, spin.NAME, spin.TURNED)
             turning.currents(drive, i_d_A, q_A)
             drive.rest(LEVEL_SETTLE_S)
-            taken.append(_window(drive, 1, lambda seconds: _and_none(drive, seconds)))
-            mean_A = spin.mean_current(taken[-1], known.offset_A)
+            every = _divisor(drive)
+            taken.append(Window(_window(drive, every, lambda seconds: _and_none(drive, seconds)), every))
+            mean_A = spin.mean_current(taken[-1].rows, known.offset_A, known.pole_pairs)
             if abs(mean_A.real - i_d_A) > OFF_SHARE * known.i_max_A:
                 raise FluxtrueError(f"commission: {spin.NAME}: {i_d_A:.3g} A along d did not settle: "
                                     f"{mean_A.real:.3g} A flow")  # fmt: skip

@@ -264,6 +264,14 @@ def voltages(rows: Array, period_s: float, periods: int = 1) -> tuple[Array, Arr
 
 
 @dataclass(frozen=True)
+class Window:
+    """A level's rows, and the PWM periods from one to the next."""
+
+    rows: Array
+    periods: int = 1
+
+
+@dataclass(frozen=True)
 class _Level:
     """Means of a window over the angle, which a rotor that becomes slower does not pass evenly."""
 
@@ -273,8 +281,9 @@ class _Level:
     omega_rad_s: float
 
 
-def _level(rows: Array, period_s: float, offset_A: complex) -> _Level:
-    i, psi, omega = voltages(rows, period_s)
+def _level(window: Window, period_s: float, offset_A: complex, pole_pairs: int) -> _Level:
+    rows = whole_turns(window.rows, pole_pairs)
+    i, psi, omega = voltages(rows, period_s, window.periods)
     i = i - offset_seen(rows[1:, 4], offset_A)
     periods = np.arange(len(i))
     speed = np.polyval(np.polyder(np.polyfit(periods, np.unwrap(rows[1:, 4]), 2)), periods)
@@ -282,22 +291,22 @@ def _level(rows: Array, period_s: float, offset_A: complex) -> _Level:
     return _Level(*means, omega)
 
 
-def _refuse_oscillation(taken: list[Array], largest_A: float) -> None:
+def _refuse_oscillation(taken: list[Window], largest_A: float) -> None:
     """The voltage of the dead time lies along the mean current only while the current keeps its direction.
 
     Gains for larger inductances than the machine's make it swing by more, about a mean that looks settled.
     """
-    swing_A = max(float(np.std(rows[:, 0] + 1j * rows[:, 1])) for rows in taken)
+    swing_A = max(float(np.std(each.rows[:, 0] + 1j * each.rows[:, 1])) for each in taken)
     if swing_A > largest_A:
         raise FluxtrueError(f"commission: {NAME}: the current oscillates by {swing_A:.2g} A rms about {largest_A:.2g} "
                             "A: the firmware's gains are for larger inductances; build the firmware for the nameplate "
                             "(tools/fluxtrue motor start)")  # fmt: skip
 
 
-def magnet(taken: list[Array], period_s: float, offset_A: complex, pole_pairs: int) -> Magnet:
+def magnet(taken: list[Window], period_s: float, offset_A: complex, pole_pairs: int) -> Magnet:
     """(CM-19): what neither changes its sign with the current, nor grows with its square, nor lies along it."""
     levels = np.array(LEVELS)
-    means = [_level(whole_turns(rows, pole_pairs), period_s, offset_A) for rows in taken]
+    means = [_level(window, period_s, offset_A, pole_pairs) for window in taken]
     psi, omega = np.array([each.psi_Vs for each in means]), np.array([each.omega_rad_s for each in means])
     i_A, along = np.array([each.i_A for each in means]), np.array([each.along for each in means])
     _refuse_oscillation(taken, float(np.abs(i_A).max()))
@@ -311,7 +320,7 @@ def direction(drive: Capture, known: Nameplate, wanted_rad_s: float, _: Connecti
     """One direction: accelerated, coasting with all levels of the current, and braked."""
     top_rad_s = _last_speed(drive, accelerate(drive, known, wanted_rad_s, NAME, TURNED))
     taken = _coast(drive, known, wanted_rad_s, top_rad_s)
-    found = magnet(taken, drive.period_s, known.offset_A, known.pole_pairs)
+    found = magnet([Window(rows) for rows in taken], drive.period_s, known.offset_A, known.pole_pairs)
     brake(drive, known, wanted_rad_s, NAME)
     true = [machine_currents(rows, known.offset_A) for rows in taken]
     return replace(found, sensor=fit([Coasting(rows[:, 5], rows[:, 1], drive.period_s) for rows in true]))
