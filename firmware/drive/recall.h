@@ -4,10 +4,10 @@
 /** Checks whether the values that a start has recalled describe this machine. The identification begins with them, but
  * neither the torque loop nor the references use them before measured windows have confirmed them.
  *   confirmed  in RECALL_AGREED updates in a row the residuals of both axes are those of a flux error of at most a
- *              quarter of noise_flux, |e| <= |w| noise_flux/4, at torque_min (identify/config.h) or more, and that at
- *              two speeds: the second is at least 3/2 or at most 2/3 of the first, or the torque has the other
- *              direction. One speed is enough where resistance and voltage drop, which can hide a wrong flux, explain
- *              no more than that bound, and from twice the local corner on
+ *              quarter of noise_flux, |e| <= |w| noise_flux/4, at torque_min (identify/config.h) or more, and the last
+ *              of them at a second speed: at least 3/2 or at most 2/3 of that of the first agreement, or with torque in
+ *              the other direction. One speed is enough where resistance and voltage drop, which can hide a wrong flux,
+ *              explain no more than that bound, and from twice the local corner on
  *   rejected   if RECALL_TRIALS updates at half of the local corner's speed or more have not confirmed them, or after
  *              RECALL_GATE_EXCEEDED updates in a row beyond the innovation gate, which is before (MN-12) reports a
  *              wrong angle: the identification restarts from its priors

@@ -225,7 +225,7 @@ bool short_circuit_is_needed(const fast_state_t *fast, safe_t safe)
            (on_gate_fault && (faults & FAULT_GATE) != 0U);
 }
 
-/* The wait brings any flux to that of the magnets (SS-21). It would raise a smaller one, which field weakening leaves,
+/* The wait brings any flux to that of the magnets (SS-21). A smaller flux, which field weakening leaves, would rise
  * (SS-31). */
 static void end_needless_wait(drive_t *drive, const sample_t *sample)
 {
@@ -233,7 +233,7 @@ static void end_needless_wait(drive_t *drive, const sample_t *sample)
     const int32_t psi_d = fx_sat_q15(flux->psi_d + drive->psi_d_error), psi_q = fx_sat_q15(flux->psi_q);
     const int32_t psi_f = drive->motor->safe_state.psi_f;
     const bool is_known = (drive->fast.faults & ~FAULTS_OF_PHASE) == 0U && is_flux_known(drive, sample);
-    if (is_known && psi_d * psi_d + psi_q * psi_q < psi_f * psi_f) {
+    if (is_known && (uint32_t)(psi_d * psi_d) + (uint32_t)(psi_q * psi_q) < (uint32_t)(psi_f * psi_f)) {
         drive->fast.short_circuit.waits = 0;
     }
 }

@@ -36,7 +36,8 @@ enum { FAULT_LIST(FAULT_BIT) };
 /** Faults after which the currents are still controlled: the drive moves them before it ends the control
  * (drive/switch_off.h). */
 #define FAULTS_CONTROLLED ((uint32_t)FAULT_TEMPERATURE | (uint32_t)FAULT_OVER_SPEED)
-/** Faults of a phase that does not follow its current, which say nothing against the samples. */
+/** Faults by a current that does not follow its reference. Their usual cause leaves the samples right; a wrong zero of
+ * a current sensor or an eccentric angle can raise them, too (SS-31). */
 #define FAULTS_OF_PHASE ((uint32_t)FAULT_CONTROL | (uint32_t)FAULT_PHASE_LOST)
 
 #endif

@@ -11,7 +11,8 @@
 #include <string.h>
 
 #define TWO_PI 6.28318530717958647693
-#define LATCHED_PERIODS 2 /* the drivers' line is active at the first sample; what the second enables acts thereafter */
+/* The drivers' line is active at the first sample; what the second one enables acts a period later. */
+#define LATCHED_PERIODS 2
 
 struct plant {
     plant_params_t params;

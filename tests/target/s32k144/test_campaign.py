@@ -45,7 +45,7 @@ def test_the_image_reacts_to_the_faults_of_the_table_as_the_table_demands(tmp_pa
     assert f"left out: {LEFT_OUT}" in done.stdout
     runs = pd.read_parquet(tmp_path / "out" / "results.parquet")
     assert set(runs["row"]) == set(LINES) - {LEFT_OUT}
-    assert set(runs.loc[runs["row"] == CHECKSUM, "first_fault"]) == {"config"}, "not the image has run"
+    assert set(runs.loc[runs["row"] == CHECKSUM, "first_fault"]) == {"config"}, "the image has not run"
 
 
 def test_the_results_are_not_recorded_in_the_table_of_the_host(tmp_path: Path) -> None:
@@ -58,7 +58,7 @@ def test_the_results_are_not_recorded_in_the_table_of_the_host(tmp_path: Path) -
     ("expected", "status", "code"),
     [
         ("over_current", "met", 0),
-        ("over_current", "open", 0),  # two of the many points of the host's runs: fewer may show less
+        ("over_current", "open", 0),  # one of the many points of the host's runs: it may show less
         ("over_speed", "met", 1),
         ("over_speed", "open", 0),
     ],

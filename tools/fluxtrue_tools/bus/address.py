@@ -57,7 +57,9 @@ class BusAddress:
         where = f"--can-interface socketcand, host={host}, port={port}"
         try:
             with socket.create_connection((str(host), port), GREETING_S) as connection:
-                said = connection.recv(len(GREETING))
+                said = b""
+                while len(said) < len(GREETING) and (part := connection.recv(len(GREETING) - len(said))):
+                    said += part
         except TimeoutError:
             said = b""
         except (OSError, OverflowError, UnicodeError) as error:

@@ -89,7 +89,7 @@ def prepare(
     """
     built = motors.load(motor, build_dir, base, where)
     host = built.folder.folder.parents[1]
-    shared = built.folder.folder / "libfluxtrue_emu.so"
+    shared = built.folder.folder / library.NAME
     if not shared.is_file() or "FLUXTRUE_BUILD_DIR" not in os.environ:
         log = host / "emulation.log"
         with sim_build.build_lock():

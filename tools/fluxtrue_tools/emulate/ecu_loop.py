@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fluxtrue_tools.bench.can_command import Frame
 from fluxtrue_tools.emulate import library
 from fluxtrue_tools.emulate.core import Core
@@ -14,8 +17,8 @@ from fluxtrue_tools.sim.members import Members, as_value, members
 from fluxtrue_tools.sim.motor import Motor
 
 STATE: Final = "ecu"
-# Objects of the image by the first part of a member's name: symbol and type. All other names begin with a member of
-# the first one; on the host its members may also begin with its own name.
+# Symbol and type of an object of the image, by the first part of a member's name. Any other name is that of a member of
+# ecu_t; "ecu." may precede it, as on the host.
 OBJECTS: Final = {STATE: (STATE, "ecu_t"), "motor": ("motor", "motor_t")}
 BOARD: Final = "board"
 """Only the port for the host keeps the board's state in memory."""
@@ -30,7 +33,7 @@ def is_possible(name: str) -> bool:
 class EmulatedEcuLoop(EcuLoop):
     """An image with an absolute angle sensor; contactor, precharge, discharge and gate supply follow its outputs.
 
-    Its motor data, named `motor.`, lie in the flash; a changed word is one that has lost its content.
+    Its motor data, named `motor.`, lie in the flash; a write changes the flash as a loss of its content does.
     """
 
     def __init__(self, image: Path, layout: Path, motor: Motor, plant: Mapping[str, float]) -> None:
@@ -48,12 +51,16 @@ class EmulatedEcuLoop(EcuLoop):
         return created
 
     def set(self, name: str, value: float) -> None:
-        """As of the host; what belongs to the board has a name of the emulator's."""
+        """As on the host; a name of the board is replaced by the emulator's."""
         super().set(OTHER_NAMES.get(name, name), value)
 
     def get(self, name: str) -> float:
-        """Likewise."""
+        """As set()."""
         return super().get(OTHER_NAMES.get(name, name))
+
+    def run(self, periods: int, ramps: Mapping[str, tuple[float, float]] | None = None) -> NDArray[np.float64]:
+        """As of the host, with these names."""
+        return super().run(periods, {OTHER_NAMES.get(name, name): ends for name, ends in (ramps or {}).items()})
 
     def _place(self, member: str) -> tuple[int, Any]:
         """Address and type."""

@@ -13,6 +13,7 @@ from fluxtrue_tools.sim.motor import Motor
 FAST: Final = 0
 COUNTING: Final = 1
 ERROR_SIZE: Final = 512
+NAME: Final = "libfluxtrue_emu.so"
 
 _SIGNATURES = {
     "sim_create_emulated": (
@@ -47,5 +48,5 @@ def load(path: Path, image: Path, layout: Path, mode: int = FAST) -> ctypes.CDLL
 
 def emulated(motor: Motor, image: Path, layout: Path, mode: int = FAST) -> Motor:
     """The same motor, its firmware on the emulated processor."""
-    path = motor.folder.folder / "libfluxtrue_emu.so"
+    path = motor.folder.folder / NAME
     return replace(motor, library=load(path, image, layout, mode))

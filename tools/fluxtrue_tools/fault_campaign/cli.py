@@ -46,14 +46,16 @@ def faults(campaign: Path, out: Path | None, fresh: bool, is_slice: bool, record
     _check_options(line, only, is_slice, record, scheduler)
     read = spec.read(campaign)
     if read.is_emulated and record:
-        raise FluxtrueError(f"--record: the table has the results of the host, {campaign}: processor is 'emulated'")
+        raise FluxtrueError(f"--record: the table has the results of the host; {campaign} has processor = 'emulated'")
     files = paths.outputs()
     table, rows = plans.read_rows(read, campaign.parent)
     files.reads(table)
     chosen = tuple(row for row in rows if any(fnmatchcase(row.id, one) for one in lines.split(",")))
-    possible = prepare.possible(read, chosen)
-    if not possible:
+    if not chosen:
         raise FluxtrueError(f"--lines {lines}: no line of {table} fits")
+    possible = prepare.possible(read, chosen)
+    if not possible or (line is not None and line in {row.id for row in chosen if row not in possible}):
+        raise FluxtrueError(f"{line or lines}: not possible on the emulated processor")
     folders, images = prepare.machines(read, campaign, build_dir, files)
     plan = plans.Plan(read, possible, folders, is_slice, images)
     if left_out := [row.id for row in chosen if row not in possible]:

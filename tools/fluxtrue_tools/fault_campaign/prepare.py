@@ -30,6 +30,7 @@ def machines(campaign: Faults, file: Path, build_dir: Path | None, outputs: Outp
         if campaign.is_emulated:
             parts = emulation.prepare(machine.motor, None, ANGLE, build_dir, file.parent, flashed=True, where=where)
             folder = parts.motor.folder
+            outputs.reads(parts.image, parts.layout)
             images.append((str(parts.image), str(parts.layout)))
         else:
             folder = prepare(machine.motor, build_dir, file.parent, where)

@@ -10,6 +10,7 @@ import pandas as pd
 
 from fluxtrue_tools.campaign import schedule
 from fluxtrue_tools.campaign.store import Store
+from fluxtrue_tools.emulate import library as emulation
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.fault_campaign import fmea, report
 from fluxtrue_tools.fault_campaign.fmea import Row
@@ -41,7 +42,8 @@ class Job:
 
 def _manifest(plan: Plan) -> dict[str, str]:
     built = b"".join(MotorFolder(name, Path(folder)).library.read_bytes() for name, folder in plan.folders)
-    built += b"".join(Path(image).read_bytes() for image, _ in plan.images)
+    for (_, folder), files in zip(plan.folders, plan.images, strict=False):  # no images: nothing is emulated
+        built += b"".join(path.read_bytes() for path in (Path(folder) / emulation.NAME, *map(Path, files)))
     return {"campaign file or table of faults": plan.digest(), "firmware or plant": hashlib.sha256(built).hexdigest()}
 
 

@@ -79,7 +79,7 @@ def _check(staging: Path, guessed: list[str]) -> None:
     except FluxtrueError as error:  # its file is in a folder that the user never sees
         said = str(error).replace(f"{staging / FILE_NAME}: ", "nameplate: ")
         if any(said.startswith(f"nameplate: machine.{key} ") for key in guessed):
-            said += "; guessed from --i-max, --vdc, --pole-pairs and --speed-max, of which one is unlikely"
+            said += "; it was guessed from --i-max, --vdc, --pole-pairs and --speed-max: check these"
         raise FluxtrueError(said) from None
 
 

@@ -62,7 +62,7 @@ class WallLine:
         try:
             answer = self._answer(frame)
         except (can.CanError, OSError) as error:
-            raise FluxtrueError(f"the bus is lost: {str(error).splitlines()[0]}") from None
+            raise FluxtrueError(f"the bus is lost: {(str(error).splitlines() or [type(error).__name__])[0]}") from None
         if answer is not None:
             return answer
         raise FluxtrueError(f"XCP: no answer within {ANSWER_S:g} s: is the ECU on this bus?")

@@ -36,14 +36,13 @@ class Channel:
     @classmethod
     def greeted(cls, host: str, port: int) -> "Channel":
         """A connection to an address that a user has given; a port on which no bench answers is refused."""
-        channel = cls(host, port)
-        channel._socket.settimeout(GREETING_S)
+        channel = cls(host, port, GREETING_S)
         try:
             channel.ask("hello")
         except (FluxtrueError, OSError, ValueError):
             channel.close()
             raise FluxtrueError(f"bench channel {host}:{port}: no bench answers there; wanted: the bench port of a "
-                                "virtual ECU, not its CAN port") from None  # fmt: skip
+                                "virtual ECU, not its CAN port, and no run of another client") from None  # fmt: skip
         channel._socket.settimeout(TIMEOUT_S)
         return channel
 
