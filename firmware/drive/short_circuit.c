@@ -161,7 +161,7 @@ static void search_shorted(drive_t *drive, const sample_t *sample, fx_pair_t rot
 {
     fast_state_t *fast = &drive->fast;
     short_circuit_t *state = &fast->short_circuit;
-    if ((fast->faults & FAULT_GATE) == 0U || state->waits == 0U) {
+    if (state->waits == 0U) {
         return;
     }
     const uint32_t periods = drive->samples.generation + 1U - fast->fault_period; /* since the first fault */
@@ -229,18 +229,23 @@ bool short_circuit_is_needed(const fast_state_t *fast, safe_t safe)
  * (SS-31). */
 static void end_needless_wait(drive_t *drive, const sample_t *sample)
 {
+    if ((drive->fast.faults & ~FAULTS_OF_PHASE) != 0U || !is_flux_known(drive, sample)) {
+        return;
+    }
     const flux_point_t *flux = &sample->point.flux;
     const int32_t psi_d = fx_sat_q15(flux->psi_d + drive->psi_d_error), psi_q = fx_sat_q15(flux->psi_q);
     const int32_t psi_f = drive->motor->safe_state.psi_f;
-    const bool is_known = (drive->fast.faults & ~FAULTS_OF_PHASE) == 0U && is_flux_known(drive, sample);
-    if (is_known && (uint32_t)(psi_d * psi_d) + (uint32_t)(psi_q * psi_q) < (uint32_t)(psi_f * psi_f)) {
+    if ((uint32_t)(psi_d * psi_d) + (uint32_t)(psi_q * psi_q) < (uint32_t)(psi_f * psi_f)) {
         drive->fast.short_circuit.waits = 0;
     }
 }
 
 bool short_circuit_may_begin(drive_t *drive, const sample_t *sample, fx_pair_t rotation)
 {
-    search_shorted(drive, sample, rotation);
-    end_needless_wait(drive, sample);
+    if ((drive->fast.faults & FAULT_GATE) != 0U) {
+        search_shorted(drive, sample, rotation);
+    } else {
+        end_needless_wait(drive, sample);
+    }
     return !short_circuit_waits(&drive->fast);
 }
