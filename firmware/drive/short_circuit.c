@@ -232,9 +232,8 @@ static void end_needless_wait(drive_t *drive, const sample_t *sample)
     if ((drive->fast.faults & ~FAULTS_OF_PHASE) != 0U || !is_flux_known(drive, sample)) {
         return;
     }
-    const flux_point_t *flux = &sample->point.flux;
-    const int32_t psi_d = fx_sat_q15(flux->psi_d + drive->psi_d_error), psi_q = fx_sat_q15(flux->psi_q);
-    const int32_t psi_f = drive->motor->safe_state.psi_f;
+    const int32_t psi_d = fx_sat_q15(sample->point.flux.psi_d + drive->psi_d_error);
+    const int32_t psi_q = fx_sat_q15(sample->point.flux.psi_q), psi_f = drive->motor->safe_state.psi_f;
     if ((uint32_t)(psi_d * psi_d) + (uint32_t)(psi_q * psi_q) < (uint32_t)(psi_f * psi_f)) {
         drive->fast.short_circuit.waits = 0;
     }

@@ -48,6 +48,13 @@ def test_the_image_reacts_to_the_faults_of_the_table_as_the_table_demands(tmp_pa
     assert set(runs.loc[runs["row"] == CHECKSUM, "first_fault"]) == {"config"}, "the image has not run"
 
 
+@pytest.mark.parametrize("option", ["--line", "--lines"])
+def test_a_line_that_the_image_cannot_have_is_refused_alone(option: str) -> None:
+    done = faults(option, LEFT_OUT)
+    assert done.returncode == 2
+    assert f"{option} {LEFT_OUT}: not possible on the emulated processor" in done.stderr
+
+
 def test_the_results_are_not_recorded_in_the_table_of_the_host(tmp_path: Path) -> None:
     done = faults("--record", "--out", tmp_path / "out")
     assert done.returncode == 2

@@ -53,9 +53,7 @@ def faults(campaign: Path, out: Path | None, fresh: bool, is_slice: bool, record
     chosen = tuple(row for row in rows if any(fnmatchcase(row.id, one) for one in lines.split(",")))
     if not chosen:
         raise FluxtrueError(f"--lines {lines}: no line of {table} fits")
-    possible = prepare.possible(read, chosen)
-    if not possible or (line is not None and line in {row.id for row in chosen if row not in possible}):
-        raise FluxtrueError(f"{line or lines}: not possible on the emulated processor")
+    possible = prepare.possible(read, chosen, line, lines)
     folders, images = prepare.machines(read, campaign, build_dir, files)
     plan = plans.Plan(read, possible, folders, is_slice, images)
     if left_out := [row.id for row in chosen if row not in possible]:

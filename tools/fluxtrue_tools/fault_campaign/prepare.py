@@ -5,6 +5,7 @@ from pathlib import Path
 
 from fluxtrue_tools.emulate import build as emulation
 from fluxtrue_tools.emulate.ecu_loop import is_possible
+from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.fault_campaign.fmea import Row
 from fluxtrue_tools.fault_campaign.spec import Faults
 from fluxtrue_tools.paths import Outputs
@@ -14,11 +15,20 @@ ANGLE = "resolver"  # of the images: an absolute angle, and the default of the p
 Names = tuple[tuple[str, str], ...]
 
 
-def possible(campaign: Faults, rows: tuple[Row, ...]) -> tuple[Row, ...]:
-    """The lines whose names exist where the campaign runs."""
+def possible(campaign: Faults, rows: tuple[Row, ...], line: str | None, lines: str) -> tuple[Row, ...]:
+    """The lines whose names exist where the campaign runs.
+
+    line, lines   options of the command line, of which one is refused if nothing of it is possible
+    """
     if not campaign.is_emulated:
         return rows
-    return tuple(row for row in rows if all(is_possible(step.name) for step in (*row.setup, *row.injection)))
+    found = tuple(row for row in rows if all(is_possible(step.name) for step in (*row.setup, *row.injection)))
+    left_out = {row.id for row in rows if row not in found}
+    if line in left_out:
+        raise FluxtrueError(f"--line {line}: not possible on the emulated processor")
+    if not found:
+        raise FluxtrueError(f"--lines {lines}: not possible on the emulated processor")
+    return found
 
 
 def machines(campaign: Faults, file: Path, build_dir: Path | None, outputs: Outputs) -> tuple[Names, Names]:
