@@ -13,7 +13,7 @@ from fluxtrue_tools.bench.can_command import Frame
 from fluxtrue_tools.emulate import library
 from fluxtrue_tools.emulate.core import Core
 from fluxtrue_tools.sim.ecu_loop import EcuLoop
-from fluxtrue_tools.sim.members import Members, as_value, members
+from fluxtrue_tools.sim.members import as_value, members
 from fluxtrue_tools.sim.motor import Motor
 
 STATE: Final = "ecu"
@@ -40,9 +40,6 @@ class EmulatedEcuLoop(EcuLoop):
         self._image = image
         super().__init__(library.emulated(motor, image, layout), plant)
         self.set("emulator.board", 1.0)
-
-    def _names(self, motor: Motor) -> Members:
-        return members(str(self._image), OBJECTS[STATE][1])
 
     def _create(self, controller: str) -> int | None:
         created: int = self._library.sim_create(controller)

@@ -14,7 +14,7 @@ from fluxtrue_tools.bus.interface import LIMITS, Interface, read_interface
 from fluxtrue_tools.bus.protect import Protector
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.library import Loop
-from fluxtrue_tools.sim.members import Members, members
+from fluxtrue_tools.sim.members import members
 from fluxtrue_tools.sim.motor import Motor
 
 LIMITS_SIGNALS: Final = ("PowerLimitDrive", "PowerLimitRegen", "BatteryVoltage")
@@ -85,14 +85,11 @@ class EcuLoop(Loop):
     def __init__(self, motor: Motor, plant: Mapping[str, float]) -> None:
         self._handle: int = 0
         link = {"dc_link_F": DC_LINK_F, "avalanche_V": AVALANCHE_PER_BATTERY * motor.plant["vdc_V"]}
-        self.names: Members = self._names(motor)
+        self._library_path = str(motor.folder.library)
         self.sender = Sender(read_interface(motor.folder.dbc))
         self.time_ms = 0
         super().__init__(motor.library, {**motor.plant, **link, "imposed_speed": 1.0, **plant}, motor.flux_map)
         self.periods_per_ms = round(1e-3 / self.period_s)
-
-    def _names(self, motor: Motor) -> Members:
-        return members(str(motor.folder.library))
 
     def _create(self, controller: str) -> int | None:
         self._handle = self._library.fluxtrue_create()
@@ -109,11 +106,11 @@ class EcuLoop(Loop):
 
     def read(self, member: str) -> float:
         """A member of the firmware's state by its name in the source, for example ecu.supervisor.state."""
-        return self.names.read(self._handle, member)
+        return members(self._library_path).read(self._handle, member)
 
     def write(self, member: str, value: float) -> None:
         """Changes it from outside, as a fault of the memory or of the board would."""
-        self.names.write(self._handle, member, value)
+        members(self._library_path).write(self._handle, member, value)
 
     @property
     def state(self) -> int:
