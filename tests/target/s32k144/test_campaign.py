@@ -16,7 +16,7 @@ from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.ecu_loop import EmulatedEcuLoop
 from fluxtrue_tools.errors import FluxtrueError
-from fluxtrue_tools.fault_campaign import fmea
+from fluxtrue_tools.fault_campaign import fmea, spec
 
 ROOT = Path(__file__).resolve().parents[3]
 CAMPAIGN = ROOT / "tests" / "fault" / "emulated.toml"
@@ -37,6 +37,13 @@ def faults(*arguments: object, campaign: Path = CAMPAIGN) -> subprocess.Complete
     command = [sys.executable, "-m", "fluxtrue_tools", "faults", str(campaign), *map(str, arguments)]
     environment = os.environ | {"PYTHONPATH": str(ROOT / "tools")}
     return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+
+
+def test_points_times_and_bounds_are_those_of_the_campaign_on_the_host() -> None:
+    image, host = spec.read(CAMPAIGN), spec.read(CAMPAIGN.with_name("campaign.toml"))
+    own = {"processor", "slice_points", "machine"}
+    assert image.model_dump(exclude=own) == host.model_dump(exclude=own)
+    assert set(image.machine) < set(host.machine)
 
 
 def test_the_image_reacts_to_the_faults_of_the_table_as_the_table_demands(tmp_path: Path) -> None:
