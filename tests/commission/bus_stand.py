@@ -61,10 +61,11 @@ class Stand:
 
 
 @contextmanager
-def bus_stand(motor: Motor, known: Nameplate, folder: Path, machine: tuple[str, int], connected: bool
-              ) -> Iterator[Stand]:  # fmt: skip
-    """machine: name and seed; connected: sensor and leads are as the firmware assumes."""
+def bus_stand(motor: Motor, known: Nameplate, folder: Path, machine: tuple[str, int], connected: bool,
+              **changed: float) -> Iterator[Stand]:  # fmt: skip
+    """machine: name and seed; connected: sensor and leads are as the firmware assumes; changed: of the plant."""
     truth, flux_map, plant = hidden.draw(*machine, motor, known.i_max_A, connected)
+    plant.update(changed)
     text = folder / "machine.txt"
     text.write_text(hidden.machine_text(plant, flux_map), encoding="utf-8")
     with ExitStack() as stack:

@@ -3,6 +3,7 @@
 
 import subprocess
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import can
@@ -14,7 +15,7 @@ from fluxtrue_tools.a2l.elf import read
 from fluxtrue_tools.bus.interface import COMMAND, read_interface
 from fluxtrue_tools.cli import run as command
 from fluxtrue_tools.commission import on_the_bus
-from fluxtrue_tools.commission.bursts import Burst, record
+from fluxtrue_tools.commission.bursts import Burst, offset, record
 from fluxtrue_tools.commission.bus import (
     FIELDS,
     PULSE_SET,
@@ -25,12 +26,15 @@ from fluxtrue_tools.commission.bus import (
     OverTheBus,
     pulsing,
 )
+from fluxtrue_tools.commission.campaign import SMALL_FOLDER
+from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.drive import DONE, FAILED
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import balance_error, score
 from fluxtrue_tools.commission.steps import chosen, run
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.scope.xcp import XcpMaster, XcpRefused
+from fluxtrue_tools.sim import motor as motors
 from fluxtrue_tools.sim.motor import Motor
 from fluxtrue_tools.vecu.process import VirtualEcu
 from fluxtrue_tools.vecu.stepped import connect
@@ -39,6 +43,9 @@ NAME, SEED = "saturated", 12
 R_SHARE, MAP_RMS, BALANCE = 0.01, 0.01, 0.002
 SMALL = Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=4)
 LONG = Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=1000, periods=2000)
+TINY, TINY_BURSTS = Burst(0.15, 0.0, (-5.0, 5.0), (-5.0, 5.0), reversals=5), 5
+START_DEG_S = 30.0  # electrical
+OFFSETS_ALONG_Q = -0.8985  # of the rotor: the current of the sensors' offsets makes most torque
 REFUSED = 1.0
 LOCKED, OUT_OF_RANGE, SYNTAX = 0x25, 0x22, 0x21
 OFF_S = 0.2  # command time-out 30 ms, ramp 15 ms
@@ -81,6 +88,23 @@ def test_a_hidden_machine_is_measured_over_can(stand: Stand, unknown: Motor, kno
     stand.line.pass_time(OFF_S)
     assert stand.line.state in ("standby", "discharge") and stand.drive.get("fault_word") == 0.0
     assert stand.drive.get("dead_time_compensation") == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_light_rotor_stands_when_pulses_begin(tmp_path: Path) -> None:
+    """With the values set and the scope armed after the braking it turned with up to 47 degrees in a second, with the
+    speed read as soon as the torque has ended with 43, and with torques shorter than a command's period with 66."""
+    motor = motors.load(str(SMALL_FOLDER))
+    plate = nameplate_of(SMALL_FOLDER, motor)
+    with bus_stand(motor, plate, tmp_path, ("hub", 103), connected=True, theta_m_rad=OFFSETS_ALONG_Q) as stand:
+        starts: list[float] = []
+        offset_A, _ = offset(stand.drive)
+        during(stand.drive, lambda: starts.append(plate.pole_pairs * stand.speed_rad_s()))
+        stand.drive.set("enable", 1.0)
+        for _ in range(TINY_BURSTS):
+            record(stand.drive, TINY, replace(plate, offset_A=offset_A))
+        print(np.round(np.degrees(starts)))
+        assert len(starts) >= TINY_BURSTS
+        assert np.degrees(max(starts)) <= START_DEG_S
 
 
 def test_lost_commands_end_the_pulses_in_the_safe_state(stand: Stand, known: Nameplate) -> None:

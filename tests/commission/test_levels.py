@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fluxtrue_tools.commission import levels, plan
+from fluxtrue_tools.commission import impulse, levels, plan
 from fluxtrue_tools.commission.bursts import Raw, integrate, mean_share, mean_sign
-from fluxtrue_tools.commission.plan import Losses
+from fluxtrue_tools.commission.impulse import Losses
 from fluxtrue_tools.motor.flux_model import Array
 
 PERIOD_S, PERIODS = 1e-4, 500
@@ -182,7 +182,7 @@ def test_the_first_half_wave_gets_half_of_the_impulse(i_d: float, next_d: float,
     top = 200.0
     last = burst(i_d, (150.0, -top, top), knee_A)
     more_A = next_d - i_d
-    share = plan.balanced(last, NO_LOSSES, PSI_F, top, more_A, LD * more_A)
+    share = impulse.balanced(last, NO_LOSSES, PSI_F, top, more_A, LD * more_A)
     following = burst(next_d, (share * top, -top, top, -top), knee_A)
     speed = np.diff(following.theta)
     assert abs(float(speed.max() + speed.min())) < 0.08 * float(np.ptp(speed))
@@ -193,8 +193,8 @@ def test_the_first_half_wave_gets_half_of_the_impulse(i_d: float, next_d: float,
 def test_the_magnet_is_what_it_moves() -> None:
     """Reluctance alone moves as a magnet does, but by another flux linkage at each bias; a guess twice too large."""
     raws = [burst(i_d, (140.0, -200.0, 200.0), 60.0) for i_d in (0.0, -50.0, -120.0)]
-    assert plan.magnet_Vs(raws, NO_LOSSES, 2.0 * PSI_F) == pytest.approx(PSI_F, rel=0.02)
-    assert plan.magnet_Vs(raws, NO_LOSSES, 10.0 * PSI_F) == pytest.approx(10.0 / plan.MAGNET * PSI_F)
+    assert impulse.magnet_Vs(raws, NO_LOSSES, 2.0 * PSI_F) == pytest.approx(PSI_F, rel=0.02)
+    assert impulse.magnet_Vs(raws, NO_LOSSES, 10.0 * PSI_F) == pytest.approx(10.0 / impulse.MAGNET * PSI_F)
 
 
 I_MAX, OFF, LAST = 250.0, 50.0, 0.17  # A: the largest current, that along d of the next burst; change in the last one
@@ -209,7 +209,7 @@ def test_a_movement_makes_the_next_burst_faster(times: float, change: float) -> 
     i_q = LAST * I_MAX * np.array([0.0, 1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 0.0])
     theta = np.linspace(0.0, times * plan.MOVED_RAD, len(i_q))
     last = Raw(1j * i_q, np.zeros(len(i_q)), theta, np.zeros(len(i_q)), PERIOD_S)
-    following, top_A = plan.at_bias(last, share, OFF, I_MAX)
+    following, top_A = plan.at_bias([plan.Taken(last, share, I_MAX)], OFF, I_MAX)
     assert following == pytest.approx(share * change / LAST)
     reach = 0.93 - 0.5 * (change - 0.15)
     assert math.hypot(top_A, OFF) == pytest.approx(reach * I_MAX)
@@ -218,4 +218,18 @@ def test_a_movement_makes_the_next_burst_faster(times: float, change: float) -> 
 def test_a_burst_at_a_bias_is_at_most_twice_as_fast_as_the_last_one() -> None:
     i_q = 0.01 * I_MAX * np.array([0.0, 1.0, 2.0, 1.0, 0.0])
     last = Raw(1j * i_q, np.zeros(5), np.linspace(0.0, 0.1, 5), np.zeros(5), PERIOD_S)
-    assert plan.at_bias(last, 0.2, OFF, I_MAX)[0] == pytest.approx(2.0 * 0.2)
+    assert plan.at_bias([plan.Taken(last, 0.2, I_MAX)], OFF, I_MAX)[0] == pytest.approx(2.0 * 0.2)
+
+
+@pytest.mark.parametrize("reached", [0.95, 0.6])
+def test_a_burst_that_ended_early_does_not_show_the_steepest_change(reached: float) -> None:
+    """Where the last one stayed far below the bound, what the one before it has shown counts, too."""
+    share, bound = 0.5, math.sqrt((0.93 * I_MAX) ** 2 - OFF**2)
+    zero = np.zeros(5)
+    before = Raw(1j * bound * np.array([0.0, 0.5, 1.0, 0.5, 0.0]), zero, zero, zero, PERIOD_S)
+    steady = np.arange(0.0, reached * bound, 0.15 * I_MAX)
+    last = Raw(1j * np.append(steady, reached * bound), *(np.zeros(len(steady) + 1),) * 3, PERIOD_S)
+    taken = [plan.Taken(raw, share, I_MAX) for raw in (before, last)]
+    following, _ = plan.at_bias(taken, OFF, I_MAX)
+    steepest_A = 0.15 * I_MAX if reached > plan.NEAR else 0.5 * bound
+    assert following == pytest.approx(share * 0.15 * I_MAX / steepest_A)

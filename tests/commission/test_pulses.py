@@ -10,6 +10,7 @@ import pytest
 from fluxtrue_tools.commission import hidden, plan
 from fluxtrue_tools.commission.bursts import FAILURES, STARTS, Burst, Raw, record
 from fluxtrue_tools.commission.drive import SIGNALS, Capture, SoftwareInTheLoop
+from fluxtrue_tools.commission.impulse import Losses
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
@@ -173,7 +174,7 @@ def test_the_next_burst_is_planned_from_the_last_valid_one(
         i, u, theta, zero = (values[:samples] for values in (raw.i, raw.u, raw.theta, raw.zero))
         return replace(raw, i=i, u=u, theta=theta, zero=zero, failure=FAILURES[4])
 
-    losses = plan.Losses(known.r_ohm, 0.0)
+    losses = Losses(known.r_ohm, 0.0)
     first = plan.first(drive, known, losses)
     monkeypatch.setattr(plan, "record", recorded)
     raws = plan.sweep(drive, first, known, losses)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fluxtrue_tools import faults
-from fluxtrue_tools.commission.drive import FAILED, MEASURED, PERIODS_MAX, PULSE, Capture
+from fluxtrue_tools.commission.drive import FAILED, MEASURED, PERIODS_MAX, PULSE, SEEN_S, STANDING_RPM, Capture
 from fluxtrue_tools.commission.nameplate import SWING_DEG, Nameplate
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
@@ -16,8 +16,11 @@ FAILURES = {1: "refused", 2: "switching was disabled", 3: "the rotor moved", 4: 
             5: "the current exceeded the machine's largest"}  # fmt: skip
 REFUSED, MOVED = FAILURES[1], FAILURES[3]
 STARTS = 6  # of one burst
-BRAKE_S, BRAKE_STEPS, STANDING_RPM = 0.005, 60, 0.5
-REST_S = 0.02  # after a burst: the drive controls the currents to zero
+BRAKE_S, BRAKE_STEPS = 0.02, 20
+FOLLOWED = 14  # of a heavy rotor's, which are longer
+CERTAIN_RPM, LIGHT, HEAVY = 2.0, (0.1, 100.0), 0.5
+ADAPTED, ADAPTED_LITTLE = 16.0, 2.0  # times at most, by one braking current
+REST_S = 0.005  # before a burst: the drive sees that the rotor stands
 TURN = 2.0 * math.pi
 STEADY = 1e-6  # of a knee: a current that does not change in a period
 
@@ -118,43 +121,68 @@ def _shift(drive: Capture, known: Nameplate) -> complex:
     return complex(known.offset_A * np.exp(-1j * drive.get("theta_e_rad")))
 
 
+def _adapted(lightness: float, change_rpm: float, guessed_rpm: float) -> float:
+    """From the change of the speed by a current, and that of a rotor as heavy as is guessed. A small change also shows
+    what else turns the rotor, and counts less."""
+    if change_rpm * guessed_rpm <= 0.0:
+        return lightness
+    most = ADAPTED if lightness * abs(guessed_rpm) > CERTAIN_RPM else ADAPTED_LITTLE
+    shown = min(max(change_rpm / guessed_rpm, lightness / most), lightness * most)
+    return min(max(math.sqrt(lightness * shown), LIGHT[0]), LIGHT[1])
+
+
+def _push_once(drive: Capture, known: Nameplate, speed_rpm: float) -> float:
+    """A short current against the speed of a light rotor; how light it is follows from what the current has changed."""
+    i_A = known.brake_A(speed_rpm, drive.brake_s, drive.lightness)
+    drive.push(1j * i_A, known.offset_A)
+    drive.rest(drive.brake_s)
+    drive.hold(known.offset_A)
+    after = drive.free_speed_rpm()
+    drive.lightness = _adapted(drive.lightness, after - speed_rpm, known.gained_rpm(i_A, drive.brake_s))
+    return after
+
+
+def _follow(drive: Capture, known: Nameplate, speed_rpm: float) -> None:
+    """A current that follows the speed of a heavy rotor to zero: what a short one lacks, because it rises slowly and
+    the legs' errors take a part of it, is not known. Where it reverses the rotor, half of it follows."""
+    strength = 1.0
+    for _ in range(FOLLOWED):
+        if abs(speed_rpm) < STANDING_RPM:
+            break
+        drive.push(1j * strength * known.brake_A(speed_rpm, BRAKE_S), known.offset_A)
+        before, speed_rpm = speed_rpm, drive.speed_rpm(BRAKE_S)
+        strength *= 0.5 if speed_rpm * before < 0.0 else 1.0
+    drive.hold(known.offset_A)
+    drive.rest(BRAKE_S)
+
+
 def _brake(drive: Capture, known: Nameplate) -> None:
-    """The alternating torque leaves some speed: a small current along q takes it away. A rotor that is much lighter
-    than the guess would swing about standstill: each reversal halves its current."""
-    drive.push(0j)
-    strength, before = 1.0, 0.0
+    """The alternating torque leaves some speed: small currents along q take it away. Only a speed without current
+    counts: the current of a rotor that has just stopped would turn it back while it falls to zero.
+
+    Without current is without the offsets of the sensors, whose torque turns a light rotor."""
+    drive.hold(known.offset_A)
+    speed = drive.speed_rpm(SEEN_S)
     for _ in range(BRAKE_STEPS):
-        speed = drive.speed_rpm(BRAKE_S)
         if abs(speed) < STANDING_RPM:
             break
-        strength *= 0.5 if drive.is_light and speed * before < 0.0 else 1.0
-        drive.push(1j * strength * known.brake_A(speed), known.offset_A)
-        before = speed
-    _rest(drive, known)
-
-
-def _rest(drive: Capture, known: Nameplate) -> None:
-    """The currents return to zero. What the drive takes for zero has the offsets of the sensors, which in REST_S turn a
-    light rotor further than a start of the pulses allows."""
-    if drive.is_light:
-        drive.push(0j, known.offset_A)
-        drive.rest(REST_S)
-        drive.let_go()
-    else:
-        drive.let_go()
-        drive.rest(REST_S)
+        if drive.lightness <= HEAVY:
+            _follow(drive, known, speed)
+            break
+        speed = _push_once(drive, known, speed)
+    drive.rest(REST_S)
 
 
 def _started(drive: Capture, burst: Burst, known: Nameplate) -> Array:
     """The rows of a burst. A step of the angle sensor is a jump of the measured speed, with which the firmware refuses
-    a start even at a standstill: it is tried again. From then on the rotor is held as one that moves easily."""
+    a start even at a standstill: it is tried again."""
     for _ in range(STARTS):
+        values = replace(burst, angle_deg=known.swing_deg).shifted(_shift(drive, known)).values()
+        drive.prepare(values)  # before the rotor is brought to a standstill, which does not last
         _brake(drive, known)
-        allowed = replace(burst, angle_deg=known.swing_deg)
-        rows = drive.pulse(allowed.shifted(_shift(drive, known)).values())
+        rows = drive.pulse(values)
         if _phase_word(drive) != REFUSED or drive.get("fault_word"):
             break
-        drive.is_light = True
     return rows
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from fluxtrue_tools import faults
 from fluxtrue_tools.a2l.elf import Description, Value
 from fluxtrue_tools.commission.bus_line import RUNNING, Line, Movement
-from fluxtrue_tools.commission.drive import DONE, FAILED, PERIODS_MAX, PULSE, nothing
+from fluxtrue_tools.commission.drive import DONE, FAILED, LIGHTNESS, PERIODS_MAX, PULSE, SEEN_S, nothing
 from fluxtrue_tools.commission.nameplate import BRAKE_SHARE, Nameplate
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
@@ -39,6 +39,8 @@ PULSE_SIGNALS: Final = ("id_A", "iq_A", "ud_V", "uq_V", "theta_e_rad", "i_zero_A
 FORMATS: Final = {"S16": "<h", "U32": "<I", "F32": "<f", "U8": "<B"}
 MARGIN_S: Final = 0.015  # captured beside the pulses: the commands to start them take some milliseconds
 POLL_S: Final = 0.005
+LATE_S: Final = 0.02  # of the reported speed
+FALL_S: Final = 0.008  # of a torque
 STOPPED: Final = 2.0  # of pulses_failure
 TOLD_S: Final = 0.03  # in which the bus says that switching is disabled, and why
 READY_S, RUN_S, OFF_S, RESET_S = 5.0, 0.5, 0.05, 0.05
@@ -98,7 +100,7 @@ class OverTheBus:
     switched_off: tuple[str, ...] = ()  # the trim acts while the shaft turns
     settings: tuple[str, ...] = ("dead_time_compensation",)
     slower: float = 12.0
-    is_light: bool = False
+    brake_s: float = 0.02  # whole periods of the command
 
     def __init__(self, line: Line, description: Description, known: Nameplate, vdc_V: float) -> None:
         self._line, self._known, self._description = line, known, description
@@ -110,6 +112,8 @@ class OverTheBus:
         self._is_moving = self._is_imposed = False
         self._connection = Movement()
         self._failure = 0.0
+        self.lightness = LIGHTNESS
+        self._prepared: dict[str, float] = {}
         line.pass_time(LISTEN_S)
         self._master = XcpMaster(line)
         unlock(self._master)
@@ -305,13 +309,22 @@ class OverTheBus:
     # Movements and captures.
 
     def speed_rpm(self, seconds: float) -> float:
-        """Let the drive run; return the speed at the end."""
-        self.rest(seconds)
+        """Let the drive run; return the speed at the end, which the drive reports some milliseconds later."""
+        self.rest(seconds + LATE_S)
         return self.get("speed_rpm")
+
+    def free_speed_rpm(self) -> float:
+        """At once: the offsets of the sensors, which cannot be held at zero, turn a light rotor."""
+        return self.speed_rpm(SEEN_S + FALL_S)
 
     def push(self, current_A: complex, offset_A: complex = 0j) -> None:
         """Request a torque instead of a current, which cannot be commanded on the bus."""
         self._line.ask(torque_Nm=self._torque_Nm(current_A.imag))
+
+    def hold(self, offset_A: complex) -> None:
+        """Request no torque. A constant one against that of the offsets, which do not turn with the rotor, would take
+        away what holds it: it rests where their current makes no torque. The drive takes it for a wrong angle, too."""
+        self.let_go()
 
     def let_go(self) -> None:
         """Request no torque."""
@@ -330,6 +343,7 @@ class OverTheBus:
         """Capture every so many periods; the action is given the time that the capture takes, and may let time pass."""
         signals = [CAPTURED[name] for name in names]
         self._arm(signals, periods // divisor, divisor)
+        self._trigger()
         with self._fault_first():
             action(periods * self.period_s)
             self._scope.until_complete(2.0 * periods * self.period_s + 1.0)
@@ -360,6 +374,9 @@ class OverTheBus:
             self._scope.stop()
             self._scope.take(setup)
             self._scope.arm()
+
+    def _trigger(self) -> None:
+        with self._fault_first():
             self._scope.trigger()
 
     @contextlib.contextmanager
@@ -383,14 +400,23 @@ class OverTheBus:
             return round(value / (2.0 * np.pi) * 65536.0)
         return round(Q15 * value) if name in ("pulses_vd", "pulses_vq", "pulses_first") else round(value)
 
-    def pulse(self, values: Mapping[str, float]) -> Array:
-        """Captured from before their start to after their end, or as far as the scope's memory reaches."""
+    def prepare(self, values: Mapping[str, float]) -> None:
+        """What takes time before a start: the values are set, and the scope waits."""
         for field, name in enumerate(FIELDS):
             self._master.command(
                 USER, PULSE_SET, field, *(self._raw(name, values[name]) & 0xFFFF).to_bytes(2, "little")
             )
-        begun_s, periods = self._line.now_s, round(values["pulses_periods"] + MARGIN_S / self.period_s)
+        periods = round(values["pulses_periods"] + MARGIN_S / self.period_s)
         self._arm([CAPTURED[name] for name in PULSE_SIGNALS], periods)
+        self._prepared = dict(values)
+
+    def pulse(self, values: Mapping[str, float]) -> Array:
+        """Captured from before their start to after their end, or as far as the scope's memory reaches."""
+        if self._prepared != values:
+            self.prepare(values)
+        self._prepared = {}
+        begun_s, periods = self._line.now_s, round(values["pulses_periods"] + MARGIN_S / self.period_s)
+        self._trigger()
         self._master.command(USER, PULSE_START)
         phase = self._until_ended()
         most = math.ceil((self._line.now_s - begun_s) / self.period_s)

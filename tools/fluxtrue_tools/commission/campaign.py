@@ -30,8 +30,10 @@ MOTORS = ROOT / "tests" / "motors"
 FOLDER, SMALL_FOLDER = MOTORS / "unknown", MOTORS / "unknown_48V"
 NAMEPLATES = {FOLDER.name: KINDS, SMALL_FOLDER.name: SMALL}
 FIRST_SEED = 100
+MOVED = "movement, deg"  # of the rotor in a burst of the map's pulses, electrical, from where it stood
+BOUNDS = {MOVED: 1.0}  # of what the steps at standstill must keep beside proof.STEPS
 MAP = ("map rms, % of psi_max", "R, %", "R beyond the sensors' gains, %", "gain balance, %",
-       "largest current, % of i_max", "movement, deg")  # fmt: skip
+       "largest current, % of i_max", MOVED)  # fmt: skip
 TURNING = ("wrong connections", "offset, deg", "psi_f, %", "inertia, %", "drag, %",
            "harmonics of the angle sensor, deg")  # fmt: skip
 
@@ -122,8 +124,9 @@ def _scored(folder: Path, drawn: list[tuple[str, int]], turning: bool, other_err
     names, scales = (TURNING, (1.0, 1.0, *(100.0,) * 3, 1.0)) if turning else (MAP, (*(100.0,) * 5, 1.0))
     if len(done):
         for name, values in zip(names, (done * scales).T, strict=True):
+            kept = f"; bound {BOUNDS[name]:g}, kept by {(values <= BOUNDS[name]).sum()}" if name in BOUNDS else ""
             click.echo(f"{name}: median {np.median(values):.2f}, 95 % within {np.percentile(values, 95):.2f}, "
-                       f"worst {values.max():.2f}")  # fmt: skip
+                       f"worst {values.max():.2f}{kept}")  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -23,7 +23,9 @@ SIGNALS = (*MEASURED, "pulses")
 PULSE, DONE, FAILED = 1.0, 3.0, 4.0  # of the name pulses
 CHUNK = 200  # periods recorded at once
 PERIODS_MAX = 4000
-SPEED_PERIODS = 10  # over which a speed is averaged
+SEEN_S, FALLS = 0.01, 6  # a speed is measured in this time, at most so many times until a current has fallen
+STANDING_RPM = 0.5
+LIGHTNESS = 4.0  # before it is known: a rotor that is lighter is turned back less
 CONNECTION = ("angle_pole_pairs", "angle_reversed", "angle_offset_rad", "angle_imposed")
 
 
@@ -38,7 +40,8 @@ class Capture(Protocol):
     switched_off: tuple[str, ...]  # those of them that would act by the guesses of the nameplate
     passed: Callable[[float], None]  # called with the seconds for which the drive has run
     slower: float  # how many times longer it runs than software in the loop
-    is_light: bool  # pulses were refused because the rotor seemed to move: it is held as one that small currents move
+    brake_s: float  # of a current that brakes the rotor
+    lightness: float  # of the rotor, as a multiple of the guess: what the braking currents have shown
 
     @property
     def period_s(self) -> float:
@@ -59,15 +62,25 @@ class Capture(Protocol):
     def speed_rpm(self, seconds: float) -> float:
         """Let the drive run; the speed at the end."""
 
+    def free_speed_rpm(self) -> float:
+        """Let the drive run until a current of push() has fallen; return the speed."""
+
     def push(self, current_A: complex, offset_A: complex = 0j) -> None:
         """A small current in the rotor frame, until let_go(); the offsets of the sensors, in the stationary frame, are
         what they show without any."""
 
+    def hold(self, offset_A: complex) -> None:
+        """The machine's torque is zero, although the sensors show their offsets, until a start of pulses."""
+
     def let_go(self) -> None:
         """No current and no torque is requested any more."""
 
+    def prepare(self, values: Mapping[str, float]) -> None:
+        """Do what takes time before pulse() with the same values."""
+
     def pulse(self, values: Mapping[str, float]) -> Array:
-        """Set the values of voltage pulses, start them and wait for their end; one row of SIGNALS for each period."""
+        """Set the values of voltage pulses, end hold(), start them at once and wait for their end; one row of SIGNALS
+        for each period."""
 
 
 class SoftwareInTheLoop:
@@ -76,12 +89,14 @@ class SoftwareInTheLoop:
     switched_off: tuple[str, ...] = ("trim",)
     settings: tuple[str, ...] = switched_off + CONNECTION
     slower: float = 1.0
+    brake_s: float = 0.005
 
     def __init__(self, loop: Loop) -> None:
         self._loop = loop
         self.period_s = loop.period_s
         self.passed: Callable[[float], None] = nothing
-        self.is_light = False
+        self.lightness = LIGHTNESS
+        self._is_held = False
 
     @staticmethod
     def _allowed(name: str) -> str:
@@ -116,26 +131,50 @@ class SoftwareInTheLoop:
         self.capture(("run_state",), round(seconds / self.period_s))
 
     def speed_rpm(self, seconds: float) -> float:
-        """Let the drive run; the speed at the end."""
-        return float(np.mean(self.capture(("speed_rpm",), round(seconds / self.period_s))[-SPEED_PERIODS:]))
+        """Let the drive run; its mean speed, by the angle: the speed that the drive reports follows some milliseconds
+        later, in which a light rotor turns back."""
+        theta = np.unwrap(self.capture(("theta_e_rad",), round(seconds / self.period_s))[:, 0])
+        slope = float(np.polyfit(self.period_s * np.arange(len(theta)), theta, 1)[0])
+        return slope / self.get("angle_pole_pairs") * 30.0 / math.pi
+
+    def free_speed_rpm(self) -> float:
+        """With gains for a machine that is not known the fall takes some milliseconds: the speed changes until then."""
+        speed = self.speed_rpm(SEEN_S)
+        for _ in range(FALLS):
+            before, speed = speed, self.speed_rpm(SEEN_S)
+            if abs(speed - before) < STANDING_RPM:
+                break
+        return speed
 
     def push(self, current_A: complex, offset_A: complex = 0j) -> None:
         """References of the current control."""
+        self._is_held = False
         shown_A = current_A + (offset_A * cmath.exp(-1j * self.get("theta_e_rad")) if offset_A else 0j)
         self.set("current_mode", 1.0)
         self.set("id_ref_A", shown_A.real)
         self.set("iq_ref_A", shown_A.imag)
 
+    def hold(self, offset_A: complex) -> None:
+        """References as the sensors' offsets."""
+        self.push(0j, offset_A)
+        self._is_held = True
+
     def let_go(self) -> None:
         """Remove all references."""
+        self._is_held = False
         self.set("id_ref_A", 0.0)
         self.set("iq_ref_A", 0.0)
         self.set("current_mode", 0.0)
+
+    def prepare(self, values: Mapping[str, float]) -> None:
+        """Nothing: setting the values takes no time."""
 
     def pulse(self, values: Mapping[str, float]) -> Array:
         """Recorded from before their start to after their end."""
         for name, value in values.items():
             self.set(name, value)
+        if self._is_held:
+            self.let_go()
         self.set("pulses", PULSE)
         parts = [self.capture(SIGNALS, CHUNK)]
         while parts[-1][-1, -1] not in (DONE, FAILED):

@@ -75,11 +75,15 @@ def _inductance(linkage: Linkage, seconds: Array, of_q: bool) -> float:
     return float(np.linalg.lstsq(matrix / scale, one(linkage.psi), rcond=None)[0][0] / scale[0])
 
 
+def _psi_d(linkage: Linkage, seconds: Array, psi_f_Vs: float) -> float:
+    """Of a level's mean current."""
+    return psi_f_Vs + float(linkage.i.real.mean()) * _inductance(linkage, seconds, of_q=False)
+
+
 def _of_movement(linkage: Linkage, seconds: Array, psi_f_Vs: float) -> Array:
     """What the integral of u_d contains because the flux linkages of the start stay where they were, V·s: (CM-26)."""
-    i = linkage.i
-    psi_d = psi_f_Vs + float(i.real.mean()) * _inductance(linkage, seconds, of_q=False)
-    psi_q = float(i[0].imag) * _inductance(linkage, seconds, of_q=True)
+    psi_d = _psi_d(linkage, seconds, psi_f_Vs)
+    psi_q = float(linkage.i[0].imag) * _inductance(linkage, seconds, of_q=True)
     return psi_d * (1.0 - linkage.turned.real) + psi_q * linkage.turned.imag
 
 
@@ -153,19 +157,39 @@ class _Equations:
         return math.sqrt(covariance[0, 0]) / float(scale[0])
 
 
-def _noises(raws: Sequence[Raw], noise_A: float, psi_f_Vs: float) -> list[Noise]:
+def _of_angle(raw: Raw, psi_f_Vs: float, angle_rad: float) -> Array:
+    """What the integral of u_d contains of the linkage that a movement gives to the other axis, with an error of the
+    angle: (CM-42)."""
+    linkage = integrate(raw, 0.0)
+    psi_d = _psi_d(linkage, raw.period_s * np.arange(len(raw.i)), psi_f_Vs)
+    return np.asarray(angle_rad * psi_d * linkage.turned.imag)
+
+
+def _noises(raws: Sequence[Raw], noise_A: float, psi_f_Vs: float, angle_rad: float) -> list[Noise]:
     """Where a ripple touches zero from one side, noise shifts the mean sign in one direction: the error is one of the
-    whole level. A first solution without it says how large all other errors are."""
+    whole level, as that of the angle. A first solution without them says how large all other errors are."""
     plain = [Noise(np.ones(len(raw.i)), np.zeros((len(raw.i), 0))) for raw in raws]
     first = _Equations(raws, plain, psi_f_Vs)
     x, left = first.solve(first.rows(0.0))
     sigma = math.sqrt(left / first.spare)
-    return [Noise(np.full(len(raw.i), sigma), x[1] * of_phases(raw, noise_A).real) for raw in raws]
+    return [
+        Noise(
+            np.full(len(raw.i), sigma),
+            np.column_stack((x[1] * of_phases(raw, noise_A).real, _of_angle(raw, psi_f_Vs, angle_rad))),
+        )
+        for raw in raws
+    ]
 
 
-def solve(raws: list[Raw], psi_f_Vs: float, compensated_V: float = 0.0, noise_A: float = 0.0) -> Resistance:
-    """All levels at once; compensated_V: by the drive, contained in the voltages; noise_A: of a current's component."""
-    equations = _Equations(raws, _noises(raws, noise_A, psi_f_Vs), psi_f_Vs)
+def solve(raws: list[Raw], psi_f_Vs: float, compensated_V: float = 0.0, noise_A: float = 0.0,
+          angle_rad: float = 0.0) -> Resistance:  # fmt: skip
+    """All levels at once.
+
+    compensated_V   by the drive, contained in the voltages
+    noise_A         standard deviation of a current's component
+    angle_rad       the same of the angle where the rotor stands
+    """
+    equations = _Equations(raws, _noises(raws, noise_A, psi_f_Vs, angle_rad), psi_f_Vs)
     means = np.array([(raw.i.real.mean(), raw.u.real.mean()) for raw in raws])
     largest_A = float(np.abs(means[:, 0]).max())
     knee_A = equations.knee_A(largest_A)

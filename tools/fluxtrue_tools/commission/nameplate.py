@@ -4,7 +4,6 @@
 import math
 from dataclasses import dataclass
 
-BRAKE_S = 0.02  # in which braking takes the speed away, with the guessed inertia
 SWING_DEG, SWING_SHAFT_DEG, SWING_MOST_DEG = 15.0, 3.75, 44.0  # electrical, of the shaft, and what the firmware takes
 BRAKE_SHARE = 0.02  # of i_max: small enough for the monitors of a current that follows slowly
 
@@ -30,9 +29,16 @@ class Nameplate:
         more of them, while the shaft moves less."""
         return min(max(SWING_DEG, SWING_SHAFT_DEG * self.pole_pairs), SWING_MOST_DEG)
 
-    def brake_A(self, speed_rpm: float) -> float:
-        """A current in q that reduces the speed."""
-        torque_Nm = self.inertia_kgm2 * speed_rpm * 2.0 * math.pi / 60.0 / BRAKE_S
-        wanted = -torque_Nm / (1.5 * self.pole_pairs * self.psi_f_Vs)
+    def gained_rpm(self, i_q_A: float, seconds: float) -> float:
+        """By a current along q, with the guesses."""
+        torque_Nm = 1.5 * self.pole_pairs * self.psi_f_Vs * i_q_A
+        return torque_Nm * seconds / self.inertia_kgm2 * 30.0 / math.pi
+
+    def brake_A(self, speed_rpm: float, seconds: float, lightness: float = 1.0) -> float:
+        """A current along q that takes the speed away in this time, or less of it.
+
+        lightness   of the rotor, as a multiple of the guess
+        """
+        wanted = -speed_rpm / (lightness * self.gained_rpm(1.0, seconds))
         most = BRAKE_SHARE * self.i_max_A
         return min(max(wanted, -most), most)

@@ -9,17 +9,24 @@ import numpy as np
 
 from fluxtrue_tools.commission.bursts import Burst, Raw, integrate, record
 from fluxtrue_tools.commission.drive import Capture
+from fluxtrue_tools.commission.impulse import Losses, balanced, magnet_Vs
 from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.swing import QUIET_RAD, Waves, quietest, response
+from fluxtrue_tools.commission.swing import SHORT as REVERSALS_Q
 from fluxtrue_tools.errors import FluxtrueError
-from fluxtrue_tools.motor.flux_model import Array
 
 FIRST_VOLTAGE = 0.15  # with the smallest inductance that is allowed for, 0.2 of i_max in a period
 FIRST_CURRENT = 0.1  # of i_max
-VOLTAGES = (0.12, 0.55)
+VOLTAGES = (0.12, 0.69)
+TOGETHER = 0.8  # of both axes: beyond it the duties of a phase reach what the bridge can make, (MO-8)
+UNSEEN, SLOW = 0.55, 0.06  # the voltage at most where it would change the current by more of i_max in a period: a
+# saturation that is not known yet would let the current miss its bound
+ABOVE_DROP = 1.8  # times what the winding drops
 STEP_D, STEP_Q = 0.12, 0.13  # of i_max: change of the current in a period at most
 BIAS_STEPS = (0.15, 0.2)  # of i_max: the same at a bias, where the last burst has shown the steepest change
 MISSED = 0.5  # of what the change is larger than the first of the two: by so much less is the bound
 BAND_STEP = 0.04  # of i_max: change of the current along d in a period at a bias, so that it stays in its band
+NEAR = 0.9  # of a bound: beyond it the steepest change is known
 FASTER = 2.0  # at most, from one bias to the next
 GROWTH = 1.3  # of the steepest change, from one level to the next
 LEVELS = (0.35, 0.65, 0.93)  # of i_max
@@ -29,10 +36,9 @@ BIASES = (0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.85)  # of -i_max
 BURSTS = 2  # at each of them: a short one moves the rotor less than a long one with as many samples
 LOST_MAX = 2  # bursts of all that may fail
 TRAVEL = 1.5  # of the time to the bias without saturation
-REVERSALS_D, REVERSALS_Q = 4, 3
+REVERSALS_D = 4
 MOVED_RAD = 0.004  # electrical: by which a burst at a bias may move the rotor without a higher voltage for the next
-MAGNET = 3.0  # times the guess of the magnet's flux linkage at most
-FIRST = (0.2, 0.9)  # share of its bound at which the first half wave may end
+SMALLER = 0.9  # at least, of its bound, for a burst after one that has moved the rotor far
 
 
 @dataclass(frozen=True)
@@ -42,14 +48,6 @@ class First:
     l_d_H: float
     l_q_H: float
     volts: float
-
-
-@dataclass(frozen=True)
-class Losses:
-    """What is known of the voltages' errors."""
-
-    r_ohm: float
-    level_V: float
 
 
 def _inductance(raw: Raw, losses: Losses, of_q: bool) -> float:
@@ -76,6 +74,11 @@ def first(drive: Capture, known: Nameplate, losses: Losses) -> First:
     return First(_inductance(along_d, losses, of_q=False), _inductance(along_q, losses, of_q=True), volts)
 
 
+def _highest(steepest_A: float, i_max_A: float) -> float:
+    """The largest share, by the steepest change of a current seen so far."""
+    return VOLTAGES[1] if VOLTAGES[1] * steepest_A < SLOW * i_max_A else UNSEEN
+
+
 def _voltage(steepest_A: float, i_max_A: float, step: float) -> float:
     """The share at which the current changes by a step in a period; steepest_A: its change with a share of 1."""
     return float(np.clip(step * i_max_A / steepest_A, *VOLTAGES))
@@ -95,113 +98,129 @@ def _steepest_within(raw: Raw, share: float, top_A: float) -> float:
     return float(changes[inside].max()) / share
 
 
-def _linkages(raw: Raw, losses: Losses) -> tuple[Array, Array]:
-    """What the voltages of the axes in use show, and what the magnet's at the start is multiplied by (CM-11)."""
-    linkage = integrate(raw, losses.r_ohm)
-    psi, (of_d, of_q) = linkage.psi + losses.level_V * linkage.of_level, raw.axes
-    return of_d * psi.real + 1j * of_q * psi.imag, linkage.turned
+@dataclass(frozen=True)
+class Taken:
+    """A burst along q from which the next one is planned."""
+
+    raw: Raw
+    share: float  # of the largest voltage
+    top_A: float
+    along_d_A: float = 0.0
+
+    def quiet_A(self, top_A: float, share: float) -> float:
+        """The bound of the next burst, smaller if the movement of this one says that it would be too large: (CM-28)."""
+        moved_rad = self.raw.moved_rad * (top_A / self.top_A) ** 3 * (self.share / share) ** 2
+        return top_A * min(max((QUIET_RAD / max(moved_rad, QUIET_RAD)) ** (1.0 / 3.0), SMALLER), 1.0)
 
 
-def _torque(psi: Array, i: Array) -> Array:
-    """Of 1.5 times the pole pairs, in V·s·A."""
-    return np.asarray((np.conj(psi) * i).imag)
+def _waves(last: Raw, share: float, volts: float, top_A: float, half: float) -> Waves:
+    """Of the next burst. What moves the rotor less is a higher voltage; only where there is none is it slow enough, and
+    of so little saturation, that its movement can be computed.
 
-
-def magnet_Vs(raws: Sequence[Raw], losses: Losses, guess_Vs: float) -> float:
-    """The magnet's flux linkage, by the share that it has in the movements of the rotor: (CM-34)."""
-    rows, moved = [], []
-    for raw in raws:
-        psi, turned = _linkages(raw, losses)
-        of_parts = np.column_stack((_torque(turned, raw.i), _torque(psi, raw.i)))
-        rows.append(raw.period_s**2 * np.cumsum(np.cumsum(of_parts, axis=0), axis=0))
-        moved.append(raw.theta - raw.theta[0])
-    of_magnet, of_others = np.linalg.lstsq(np.vstack(rows), np.concatenate(moved), rcond=None)[0]
-    found = of_magnet / of_others if of_others > 0.0 else guess_Vs
-    return float(np.clip(found, guess_Vs / MAGNET, guess_Vs * MAGNET))
-
-
-def _rise(i_q: Array) -> slice:
-    """From zero to the largest current of a half wave."""
-    top = int(np.argmax(np.abs(i_q)))
-    other = np.flatnonzero(i_q[:top] * i_q[top] <= 0.0)
-    return slice(int(other[-1]) + 1 if len(other) else 0, top + 1)
-
-
-def balanced(
-    raw: Raw, losses: Losses, psi_f_Vs: float, top_A: float, more_A: float = 0.0, more_Vs: float = 0.0
-) -> float:
-    """The share of its bound at which the first half wave along q ends with half of the impulse of the others: (CM-27).
-
-    top_A             bound of the next burst
-    more_A, more_Vs   current and flux linkage along d that the next burst has more than this one
+    half   where the first half wave has half of the impulse
     """
-    psi, turned = _linkages(raw, losses)
-    rise = _rise(raw.i.imag)
-    torque = _torque(psi + psi_f_Vs * turned + more_Vs, raw.i + more_A)[rise]
-    i_q = raw.i.imag[rise]
-    impulse = np.maximum.accumulate(np.cumsum(torque * np.sign(i_q[-1])))
-    reached = np.maximum.accumulate(np.abs(i_q))
-    half = 0.5 * float(np.interp(top_A, reached, impulse))
-    return float(np.clip(np.interp(half, impulse, reached) / min(top_A, float(reached[-1])), *FIRST))
+    if share < VOLTAGES[1]:
+        return Waves(-top_A, top_A, half, REVERSALS_Q)
+    return quietest(response(last), share * volts, top_A)
 
 
-def at_bias(last: Raw, share: float, off_A: float, i_max_A: float) -> tuple[float, float]:
+def _along_q(v_d: float, share: float, d: tuple[float, float], waves: Waves, delay: int = 0) -> Burst:
+    return Burst(v_d, share, d, (waves.low_A, waves.high_A), waves.reversals, delay, waves.first)
+
+
+def at_bias(seen: Sequence[Taken], off_A: float, i_max_A: float) -> tuple[float, float]:
     """Voltage and bound of the next burst along q. The movement falls with the square of the voltage (CM-28); a higher
     one than needed leaves fewer samples, and the current misses its bound by more.
 
-    share   of the last burst
+    seen    the last bursts; of one that ended far below the bound the steepest change is not known
     off_A   the largest current along d
     """
-    reach_A = LEVELS[-1] * i_max_A
-    steepest_A = _steepest_within(last, share, math.sqrt(reach_A**2 - off_A**2))
+    last, reach_A = seen[-1], LEVELS[-1] * i_max_A
+    top_A = math.sqrt(reach_A**2 - off_A**2)
+    trusted = seen[-1:] if np.abs(last.raw.i.imag).max() > NEAR * top_A else seen
+    steepest_A = max(_steepest_within(each.raw, each.share, top_A) for each in trusted)
     low, high = (_voltage(steepest_A, i_max_A, step) for step in BIAS_STEPS)
-    wanted = share * math.sqrt(last.moved_rad / MOVED_RAD)
-    following = min(max(wanted, low), high, FASTER * share)
+    wanted = last.share * math.sqrt(last.raw.moved_rad / MOVED_RAD)
+    highest = _highest(_steepest(last.raw, last.share, of_q=True), i_max_A)
+    following = min(max(wanted, low), high, FASTER * last.share, highest)
     reach_A -= MISSED * max(following * steepest_A - BIAS_STEPS[0] * i_max_A, 0.0)
     return following, math.sqrt(reach_A**2 - off_A**2)
 
 
-def _ladder(drive: Capture, known: Nameplate, losses: Losses, steepest_A: float,
-            of_q: bool) -> list[Raw]:  # fmt: skip
-    """Larger and larger currents along one axis: each level's steepest change limits the voltage of the next."""
+def _checked(raw: Raw, axis: str, top_A: float) -> Raw:
+    if raw.failure:
+        raise FluxtrueError(f"commission: pulses along {axis} up to {top_A:.3g} A: {raw.failure}")
+    return raw
+
+
+def _of_level(top_A: float, steepest_A: float, step: float, known: Nameplate, losses: Losses, volts: float) -> float:
+    """The voltage of a larger current than before. It is well above what the winding drops: a current that rises
+    slowly leaves time to turn the rotor.
+
+    volts   of a share of 1
+    """
+    least = ABOVE_DROP * losses.r_ohm * top_A / volts
+    return min(max(_voltage(GROWTH * steepest_A, known.i_max_A, step), least), _highest(steepest_A, known.i_max_A))
+
+
+def _ladder_d(drive: Capture, known: Nameplate, losses: Losses, volts: float, steepest_A: float) -> list[Raw]:
+    """Larger and larger currents: each level's steepest change limits the voltage of the next."""
     raws: list[Raw] = []
-    i_max_A = known.i_max_A
     for level in LEVELS:
-        top = level * i_max_A
-        share = _voltage(GROWTH * steepest_A, i_max_A, STEP_Q if of_q else STEP_D)
-        free = (-top, top)
-        if of_q:
-            half = balanced(raws[-1], losses, magnet_Vs(raws, losses, known.psi_f_Vs), top) if raws else Burst.first
-            burst = Burst(0.0, share, free, free, REVERSALS_Q, first=half)
-        else:
-            burst = Burst(share, 0.0, (-top, TOP_D * i_max_A), free, REVERSALS_D)
-        raws.append(record(drive, burst, known))
-        if raws[-1].failure:
-            raise FluxtrueError(
-                f"commission: pulses along {'q' if of_q else 'd'} up to {top:.3g} A: {raws[-1].failure}"
-            )
-        steepest_A = max(_steepest(raws[-1], share, of_q), steepest_A)
+        top_A = level * known.i_max_A
+        share = _of_level(top_A, steepest_A, STEP_D, known, losses, volts)
+        burst = Burst(share, 0.0, (-top_A, TOP_D * known.i_max_A), (-top_A, top_A), REVERSALS_D)
+        raws.append(_checked(record(drive, burst, known), "d", top_A))
+        steepest_A = max(_steepest(raws[-1], share, of_q=False), steepest_A)
     return raws
+
+
+def _ladder_q(drive: Capture, known: Nameplate, losses: Losses, volts: float, steepest_A: float) -> list[Taken]:
+    """The same along q, with little movement of the rotor."""
+    taken: list[Taken] = []
+    for level in LEVELS:
+        top_A = level * known.i_max_A
+        share = _of_level(top_A, steepest_A, STEP_Q, known, losses, volts)
+        waves = Waves(-top_A, top_A, Burst.first, REVERSALS_Q)
+        if taken:
+            if share < VOLTAGES[1]:
+                top_A = taken[-1].quiet_A(top_A, share)
+            psi_f_Vs = magnet_Vs([each.raw for each in taken], losses, known.psi_f_Vs)
+            half = balanced(taken[-1].raw, losses, psi_f_Vs, top_A)
+            waves = _waves(taken[-1].raw, share, volts, top_A, half)
+        burst = _along_q(0.0, share, (-top_A, top_A), waves)
+        raw = _checked(record(drive, burst, known), "q", top_A)
+        taken.append(Taken(raw, share, top_A))
+        steepest_A = max(_steepest(raw, share, of_q=True), steepest_A)
+    return taken
+
+
+def _at_biases(drive: Capture, found: First, known: Nameplate, losses: Losses,
+               along_q: list[Taken]) -> list[Raw]:  # fmt: skip
+    """Along q at each bias of d, each planned from the last burst that is valid."""
+    i_max_A, steep_d = known.i_max_A, found.volts * drive.period_s / found.l_d_H
+    band = BAND * i_max_A
+    taken, raws = list(along_q), [each.raw for each in along_q]
+    for bias in np.repeat(BIASES, BURSTS):
+        target, last = -bias * i_max_A, taken[-1]
+        share, top_A = at_bias(taken[-2:], abs(target) + band, i_max_A)
+        v_d = min(_voltage(steep_d, i_max_A, BAND_STEP), math.sqrt(TOGETHER**2 - share**2))
+        delay = math.ceil(TRAVEL * bias * i_max_A / (v_d * steep_d))
+        more_A = target - last.along_d_A
+        psi_f_Vs = magnet_Vs([raw for raw in raws if raw.is_valid], losses, known.psi_f_Vs)
+        if share < VOLTAGES[1]:
+            top_A = last.quiet_A(top_A, share)
+        half = balanced(last.raw, losses, psi_f_Vs, top_A, more_A, found.l_d_H * more_A)
+        waves = _waves(last.raw, share, found.volts, top_A, half)
+        raws.append(record(drive, _along_q(v_d, share, (target - band, target + band), waves, delay), known))
+        if raws[-1].is_valid:
+            taken.append(Taken(raws[-1], share, top_A, target))
+    return raws[len(along_q) :]
 
 
 def sweep(drive: Capture, found: First, known: Nameplate, losses: Losses) -> list[Raw]:
     """d alone, q alone, then q at each bias of d."""
-    period_s, i_max_A = drive.period_s, known.i_max_A
-    along_d = _ladder(drive, known, losses, found.volts * period_s / found.l_d_H, of_q=False)
-    along_q = _ladder(drive, known, losses, found.volts * period_s / found.l_q_H, of_q=True)
-    raws = [*along_d, *along_q]
-    steep_d = found.volts * period_s / found.l_d_H
-    v_d = _voltage(steep_d, i_max_A, BAND_STEP)
-    band, v_q = BAND * i_max_A, float(np.abs(along_q[-1].u.imag).max()) / found.volts
-    last, centre = along_q[-1], 0.0  # the last burst that is valid, from which the next one is planned
-    for bias in np.repeat(BIASES, BURSTS):
-        target, delay = -bias * i_max_A, math.ceil(TRAVEL * bias * i_max_A / (v_d * steep_d))
-        more_A = target - centre
-        share, top = at_bias(last, v_q, abs(target) + band, i_max_A)
-        psi_f_Vs = magnet_Vs([raw for raw in raws[len(along_d) :] if raw.is_valid], losses, known.psi_f_Vs)
-        half = balanced(last, losses, psi_f_Vs, top, more_A, found.l_d_H * more_A)
-        raws.append(record(drive, Burst(v_d, share, (target - band, target + band), (-top, top), REVERSALS_Q, delay,
-                                        half), known))  # fmt: skip
-        if raws[-1].is_valid:
-            last, centre, v_q = raws[-1], target, share
-    return raws
+    per_period = found.volts * drive.period_s
+    along_d = _ladder_d(drive, known, losses, found.volts, per_period / found.l_d_H)
+    along_q = _ladder_q(drive, known, losses, found.volts, per_period / found.l_q_H)
+    return [*along_d, *(each.raw for each in along_q), *_at_biases(drive, found, known, losses, along_q)]

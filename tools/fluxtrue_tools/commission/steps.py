@@ -17,6 +17,7 @@ from fluxtrue_tools.commission.bus import OverTheBus
 from fluxtrue_tools.commission.connection import Followed
 from fluxtrue_tools.commission.drag import Drag
 from fluxtrue_tools.commission.drive import Capture, nothing
+from fluxtrue_tools.commission.impulse import Losses
 from fluxtrue_tools.commission.levels import Resistance
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.spin import Spun
@@ -130,10 +131,10 @@ def _drag(drive: Capture, found: Found, known: Nameplate) -> None:
         found.spun = replace(found.spun, harmonics=with_it)
 
 
-def _losses(found: Found, known: Nameplate) -> plan.Losses:
+def _losses(found: Found, known: Nameplate) -> Losses:
     if found.resistance is None:
-        return plan.Losses(known.r_ohm, known.level_V)
-    return plan.Losses(found.resistance.r_ohm, found.resistance.level_V)
+        return Losses(known.r_ohm, known.level_V)
+    return Losses(found.resistance.r_ohm, found.resistance.level_V)
 
 
 def _resistance(drive: Capture, found: Found, known: Nameplate) -> None:
@@ -142,14 +143,17 @@ def _resistance(drive: Capture, found: Found, known: Nameplate) -> None:
     found.levels = levels.measure(drive, known, found.first)
     found.balance = balance.measure(found.levels)
     alike = [found.balance.corrected(raw) for raw in found.levels]
-    found.resistance = levels.solve(alike, known.psi_f_Vs, drive.get("compensation_V"), found.balance.noise_A)
+    angle_rad = ANGLE_RAD if found.spun is None else 0.0
+    found.resistance = levels.solve(
+        alike, known.psi_f_Vs, drive.get("compensation_V"), found.balance.noise_A, angle_rad
+    )
     found.first = plan.first(drive, known, _losses(found, known))
 
 
 def _map(drive: Capture, found: Found, known: Nameplate) -> None:
     assert found.resistance is not None and found.first is not None
     _enable(drive)
-    losses = plan.Losses(found.resistance.r_ohm, found.resistance.total_V)
+    losses = Losses(found.resistance.r_ohm, found.resistance.total_V)
     compensated = drive.get("dead_time_compensation")
     drive.set("dead_time_compensation", 0.0)  # by the sign of currents with an offset: it can be computed better later
     try:
@@ -166,6 +170,8 @@ def _map(drive: Capture, found: Found, known: Nameplate) -> None:
     found.surface = surface.fit(alike, found.balance.noise_A, known.i_max_A, found.resistance.r_ohm,
                                 (known.psi_f_Vs, error), found.resistance.total_V, found.resistance.knee_A)  # fmt: skip
 
+
+ANGLE_RAD = 0.03  # electrical: of the angle that `phases` finds, and of a sensor with harmonics
 
 STEPS = (
     Step("offsets", "switching is disabled, nothing moves, no current", _offsets, 0.15),
