@@ -2,12 +2,17 @@
 """A signal ends a campaign although Python has discarded the exception of its handler."""
 
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from fluxtrue_tools import interrupts
 from fluxtrue_tools.campaign import schedule
+
+TESTS = Path(__file__).resolve().parents[2]
 
 
 class Signalled:
@@ -55,6 +60,14 @@ def test_a_signal_whose_exception_is_lost_ends_a_campaign_at_its_next_case(numbe
 def test_a_signal_outside_of_finalisers_raises_at_once(number: signal.Signals) -> None:
     with pytest.raises((KeyboardInterrupt, SystemExit)):
         signal.raise_signal(number)
+
+
+def test_a_gate_in_the_background_can_interrupt_what_it_starts() -> None:
+    """Where SIGINT is ignored, as by a shell's background jobs, a campaign that a test ends would run for hours."""
+    code = ("import runpy, signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN); runpy.run_path(sys.argv[1]);"
+            "signal.raise_signal(signal.SIGINT)")  # fmt: skip
+    done = subprocess.run([sys.executable, "-c", code, TESTS / "conftest.py"], capture_output=True, check=False)
+    assert done.returncode == -signal.SIGINT
 
 
 def test_a_signal_that_is_ignored_stays_ignored() -> None:
