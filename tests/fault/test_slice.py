@@ -2,15 +2,13 @@
 """The slice of the fault campaign for every test run: a few points of each line of docs/safety/fmea.csv."""
 
 import json
-import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
+from fault_command import faults
 
 from fluxtrue_tools.fault_campaign import fmea
 from fluxtrue_tools.fault_campaign.fmea import MET, OPEN, PHYSICS
@@ -18,12 +16,6 @@ from fluxtrue_tools.fault_campaign.fmea import MET, OPEN, PHYSICS
 ROOT = Path(__file__).resolve().parents[2]
 CAMPAIGN = Path(__file__).with_name("campaign.toml")
 TABLE = ROOT / "docs" / "safety" / "fmea.csv"
-
-
-def faults(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "fluxtrue_tools", "faults", *map(str, arguments)]
-    environment = os.environ | {"PYTHONPATH": str(ROOT / "tools")}
-    return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
 
 
 @pytest.fixture(scope="module")

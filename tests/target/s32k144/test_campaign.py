@@ -4,13 +4,11 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pandas as pd
 import pytest
+from fault_command import faults
 
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.emulate import build
@@ -33,12 +31,6 @@ def compiler() -> None:
         pytest.skip("no cross compiler: there is no image to emulate")
 
 
-def faults(*arguments: object, campaign: Path = CAMPAIGN) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "fluxtrue_tools", "faults", str(campaign), *map(str, arguments)]
-    environment = os.environ | {"PYTHONPATH": str(ROOT / "tools")}
-    return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
-
-
 def test_points_times_and_bounds_are_those_of_the_campaign_on_the_host() -> None:
     image, host = spec.read(CAMPAIGN), spec.read(CAMPAIGN.with_name("campaign.toml"))
     own = {"processor", "slice_points", "machine"}
@@ -47,7 +39,7 @@ def test_points_times_and_bounds_are_those_of_the_campaign_on_the_host() -> None
 
 
 def test_the_image_reacts_to_the_faults_of_the_table_as_the_table_demands(tmp_path: Path) -> None:
-    done = faults("--slice", "--lines", ",".join(LINES), "--out", tmp_path / "out", "--workers", 2)
+    done = faults(CAMPAIGN, "--slice", "--lines", ",".join(LINES), "--out", tmp_path / "out", "--workers", 2)
     assert done.returncode == 0, done.stdout + done.stderr
     assert f"left out: {LEFT_OUT}" in done.stdout
     runs = pd.read_parquet(tmp_path / "out" / "results.parquet")
@@ -57,13 +49,13 @@ def test_the_image_reacts_to_the_faults_of_the_table_as_the_table_demands(tmp_pa
 
 @pytest.mark.parametrize("option", ["--line", "--lines"])
 def test_a_line_that_the_image_cannot_have_is_refused_alone(option: str) -> None:
-    done = faults(option, LEFT_OUT)
+    done = faults(CAMPAIGN, option, LEFT_OUT)
     assert done.returncode == 2
     assert f"{option} {LEFT_OUT}: not possible on the emulated processor" in done.stderr
 
 
 def test_the_results_are_not_recorded_in_the_table_of_the_host(tmp_path: Path) -> None:
-    done = faults("--record", "--out", tmp_path / "out")
+    done = faults(CAMPAIGN, "--record", "--out", tmp_path / "out")
     assert done.returncode == 2
     assert "--record: the table has the results of the host" in done.stderr
 
@@ -87,7 +79,7 @@ def test_a_line_that_says_met_must_not_be_open_with_the_image(
     )
     line = f"open,sensor,input open,,plant.current_open_a=1,,safe_state,{expected},5,,50,,,,60,{status},hsm1/0/+,,\n"
     (tmp_path / "fmea.csv").write_text(",".join(fmea.COLUMNS) + "\n" + line, encoding="utf-8")
-    done = faults("--out", tmp_path / "out", campaign=tmp_path / "one.toml")
+    done = faults(tmp_path / "one.toml", "--out", tmp_path / "out")
     assert done.returncode == code, done.stdout + done.stderr
     assert ("status met is NOT TRUE" in done.stdout) == bool(code)
 

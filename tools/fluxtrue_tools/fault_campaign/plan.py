@@ -40,7 +40,7 @@ class Plan:
 
     def loop_of(self, index: int) -> LoopOf:
         """What drives this machine."""
-        return partial(EmulatedEcuLoop, *map(Path, self.images[index])) if self.images else EcuLoop
+        return partial(EmulatedEcuLoop, *map(Path, self.images[index])) if self.campaign.is_emulated else EcuLoop
 
     @property
     def cases(self) -> range:
