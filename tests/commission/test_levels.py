@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fluxtrue_tools.commission import impulse, levels, plan
+from fluxtrue_tools.commission import impulse, levels, plan, swing
 from fluxtrue_tools.commission.bursts import Raw, integrate, mean_share, mean_sign
 from fluxtrue_tools.commission.impulse import Losses
+from fluxtrue_tools.commission.swing import LONG, SHORT, Waves
 from fluxtrue_tools.motor.flux_model import Array
 
 PERIOD_S, PERIODS = 1e-4, 500
@@ -198,6 +199,7 @@ def test_the_magnet_is_what_it_moves() -> None:
 
 
 I_MAX, OFF, LAST = 250.0, 50.0, 0.17  # A: the largest current, that along d of the next burst; change in the last one
+WAVES = Waves(-I_MAX, I_MAX, 0.7, SHORT)
 
 
 @pytest.mark.parametrize(
@@ -209,7 +211,7 @@ def test_a_movement_makes_the_next_burst_faster(times: float, change: float) -> 
     i_q = LAST * I_MAX * np.array([0.0, 1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 0.0])
     theta = np.linspace(0.0, times * plan.MOVED_RAD, len(i_q))
     last = Raw(1j * i_q, np.zeros(len(i_q)), theta, np.zeros(len(i_q)), PERIOD_S)
-    following, top_A = plan.at_bias([plan.Taken(last, share, I_MAX)], OFF, I_MAX)
+    following, top_A = plan.at_bias([plan.Taken(last, share, WAVES)], OFF, I_MAX)
     assert following == pytest.approx(share * change / LAST)
     reach = 0.93 - 0.5 * (change - 0.15)
     assert math.hypot(top_A, OFF) == pytest.approx(reach * I_MAX)
@@ -218,7 +220,7 @@ def test_a_movement_makes_the_next_burst_faster(times: float, change: float) -> 
 def test_a_burst_at_a_bias_is_at_most_twice_as_fast_as_the_last_one() -> None:
     i_q = 0.01 * I_MAX * np.array([0.0, 1.0, 2.0, 1.0, 0.0])
     last = Raw(1j * i_q, np.zeros(5), np.linspace(0.0, 0.1, 5), np.zeros(5), PERIOD_S)
-    assert plan.at_bias([plan.Taken(last, 0.2, I_MAX)], OFF, I_MAX)[0] == pytest.approx(2.0 * 0.2)
+    assert plan.at_bias([plan.Taken(last, 0.2, WAVES)], OFF, I_MAX)[0] == pytest.approx(2.0 * 0.2)
 
 
 @pytest.mark.parametrize("reached", [0.95, 0.6])
@@ -229,7 +231,19 @@ def test_a_burst_that_ended_early_does_not_show_the_steepest_change(reached: flo
     before = Raw(1j * bound * np.array([0.0, 0.5, 1.0, 0.5, 0.0]), zero, zero, zero, PERIOD_S)
     steady = np.arange(0.0, reached * bound, 0.15 * I_MAX)
     last = Raw(1j * np.append(steady, reached * bound), *(np.zeros(len(steady) + 1),) * 3, PERIOD_S)
-    taken = [plan.Taken(raw, share, I_MAX) for raw in (before, last)]
+    taken = [plan.Taken(raw, share, WAVES) for raw in (before, last)]
     following, _ = plan.at_bias(taken, OFF, I_MAX)
     steepest_A = 0.15 * I_MAX if reached > plan.NEAR else 0.5 * bound
     assert following == pytest.approx(share * 0.15 * I_MAX / steepest_A)
+
+
+@pytest.mark.parametrize(
+    ("high_A", "reversals", "times"), [(I_MAX, SHORT, 1.0), (0.95 * I_MAX, SHORT, 0.95**-3), (I_MAX, LONG, 2.0)]
+)
+def test_a_bound_is_smaller_if_the_last_movement_predicts_too_much(high_A: float, reversals: int, times: float) -> None:
+    """(CM-28): with the third power of the bound that the last burst really had, and twice the movement of five half
+    waves."""
+    moved = 1.1 * swing.SWING_RAD / times
+    raw = Raw(np.zeros(2) + 0j, np.zeros(2) + 0j, np.array([0.0, moved]), np.zeros(2), PERIOD_S)
+    taken = plan.Taken(raw, 0.3, Waves(-high_A, high_A, 0.7, reversals))
+    assert taken.quiet_A(I_MAX, 0.3) == pytest.approx(I_MAX * 1.1 ** (-1.0 / 3.0))

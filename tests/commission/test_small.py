@@ -9,7 +9,7 @@ import pytest
 from watched import Watched
 
 from fluxtrue_tools.commission import drag, heating, hidden, iron, plot, spin, turning
-from fluxtrue_tools.commission.campaign import BOUNDS, FOLDER, MOVED, NAMEPLATES, SMALL_FOLDER, draw
+from fluxtrue_tools.commission.campaign import BOUNDS, FOLDER, MOVEMENT, NAMEPLATES, SMALL_FOLDER, draw
 from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.drag import Drag
 from fluxtrue_tools.commission.drive import SoftwareInTheLoop
@@ -129,7 +129,7 @@ def test_a_winding_that_drops_more_than_the_voltage_of_the_levels(small: Motor, 
 
 
 LIGHT = [("anaheim", 101), ("hub", 103), ("anaheim", 104)]  # of the nine those that moved by more than a degree
-START_RAD_S = np.radians(60.0)  # electrical: half a degree in a burst of the map
+START_RAD_S = np.radians(30.0)  # electrical: a quarter of a degree in a burst of the map
 
 
 @pytest.mark.parametrize(("name", "seed"), LIGHT)
@@ -145,9 +145,9 @@ def test_a_light_rotor_moves_by_less_than_a_degree(name: str, seed: int, small: 
     starts_rad_s = plate.pole_pairs * np.abs(drive.starts_rad_s)
     reached = score(found.surface.model, truth, plate.i_max_A, truth.psi_f_Vs)
     print(name, seed, np.round(moved_deg, 2), np.round(np.degrees(starts_rad_s)), reached)
-    assert 0.0 < moved_deg.max() <= BOUNDS[MOVED]
+    assert 0.0 < moved_deg.max() <= BOUNDS[MOVEMENT]
     assert np.degrees(found.moved_rad) == pytest.approx(moved_deg.max(), abs=0.1)  # what the campaign reports
-    assert starts_rad_s.max() <= START_RAD_S
+    assert starts_rad_s[-len(found.bursts) :].max() <= START_RAD_S
     assert reached.map_rms <= STEPS["map_rms"]
 
 

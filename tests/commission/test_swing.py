@@ -53,7 +53,7 @@ def test_five_half_waves_move_it_by_half_to_each_side(monkeypatch: pytest.Monkey
     monkeypatch.setattr(swing, "UNCERTAIN", 0.0)
     monkeypatch.setattr(swing, "PERIODS", 6000)
     rise = TOP / (EVEN.per_volt * VOLTS)
-    moved = farthest(EVEN, Waves(-TOP * math.sqrt(0.8), TOP, math.sqrt(0.3), LONG))
+    moved = farthest(EVEN, Waves(-TOP * math.sqrt(0.808), TOP, math.sqrt(0.308), LONG))
     assert moved == pytest.approx(0.335 * EVEN.rad_per_A * TOP * rise**2, rel=0.03)
 
 
@@ -63,8 +63,8 @@ def test_the_shape_that_is_needed_is_chosen() -> None:
     print(chosen)
     assert [waves.reversals for waves in chosen[:2]] == [SHORT, LONG]
     assert [waves.high_A < TOP for waves in chosen] == [False, False, True]
-    assert farthest(RIPPLED, Waves(-TOP, TOP, math.sqrt(0.5), SHORT)) > swing.QUIET_RAD
-    assert farthest(RIPPLED, swing.quietest(RIPPLED, VOLTS, TOP)) <= swing.QUIET_RAD
+    assert farthest(RIPPLED, Waves(-TOP, TOP, math.sqrt(0.5), SHORT)) > swing.SWING_RAD
+    assert farthest(RIPPLED, swing.quietest(RIPPLED, VOLTS, TOP)) <= swing.SWING_RAD
 
 
 def test_the_response_of_a_recorded_burst(small: Motor, plate: Nameplate) -> None:

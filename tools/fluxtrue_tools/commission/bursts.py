@@ -16,10 +16,11 @@ FAILURES = {1: "refused", 2: "switching was disabled", 3: "the rotor moved", 4: 
             5: "the current exceeded the machine's largest"}  # fmt: skip
 REFUSED, MOVED = FAILURES[1], FAILURES[3]
 STARTS = 6  # of one burst
-BRAKE_S, BRAKE_STEPS = 0.02, 20
-FOLLOWED = 14  # of a heavy rotor's, which are longer
-CERTAIN_RPM, LIGHT, HEAVY = 2.0, (0.1, 100.0), 0.5
-ADAPTED, ADAPTED_LITTLE = 16.0, 2.0  # times at most, by one braking current
+PUSHES = 20  # short currents against a light rotor, at most
+FOLLOW_S, FOLLOWED = 0.02, 14  # a heavy rotor: time between two changes of the current, and their number at most
+CERTAIN_RPM = 2.0  # change of the speed that is expected: from it on other torques hardly count
+LIGHT, HEAVY = (0.1, 100.0), 0.5  # range of the lightness; up to HEAVY a rotor counts as heavy
+ADAPTED, ADAPTED_LITTLE = 16.0, 2.0  # times at most that a current may show; the lightness changes by the root of it
 REST_S = 0.005  # before a burst: the drive sees that the rotor stands
 TURN = 2.0 * math.pi
 STEADY = 1e-6  # of a knee: a current that does not change in a period
@@ -144,26 +145,29 @@ def _push_once(drive: Capture, known: Nameplate, speed_rpm: float) -> float:
 
 def _follow(drive: Capture, known: Nameplate, speed_rpm: float) -> None:
     """A current that follows the speed of a heavy rotor to zero: what a short one lacks, because it rises slowly and
-    the legs' errors take a part of it, is not known. Where it reverses the rotor, half of it follows."""
+    the legs' errors take a part of it, is not known. Where it reverses the rotor, half of it follows.
+
+    The lightness is not changed any more: a rotor that counts as heavy does so until the end of the measurement."""
     strength = 1.0
     for _ in range(FOLLOWED):
         if abs(speed_rpm) < STANDING_RPM:
             break
-        drive.push(1j * strength * known.brake_A(speed_rpm, BRAKE_S), known.offset_A)
-        before, speed_rpm = speed_rpm, drive.speed_rpm(BRAKE_S)
+        drive.push(1j * strength * known.brake_A(speed_rpm, FOLLOW_S), known.offset_A)
+        before, speed_rpm = speed_rpm, drive.speed_rpm(FOLLOW_S)
         strength *= 0.5 if speed_rpm * before < 0.0 else 1.0
     drive.hold(known.offset_A)
-    drive.rest(BRAKE_S)
+    drive.rest(FOLLOW_S)
 
 
 def _brake(drive: Capture, known: Nameplate) -> None:
-    """The alternating torque leaves some speed: small currents along q take it away. Only a speed without current
-    counts: the current of a rotor that has just stopped would turn it back while it falls to zero.
+    """The alternating torque leaves some speed, which small currents along q take away.
 
-    Without current is without the offsets of the sensors, whose torque turns a light rotor."""
+    With a light rotor only a speed without current counts: the current of a rotor that has just stopped would turn it
+    back while it falls to zero. A heavy one is braked by its speed during the current. Without current is without the
+    offsets of the sensors, whose torque turns a light rotor."""
     drive.hold(known.offset_A)
     speed = drive.speed_rpm(SEEN_S)
-    for _ in range(BRAKE_STEPS):
+    for _ in range(PUSHES):
         if abs(speed) < STANDING_RPM:
             break
         if drive.lightness <= HEAVY:
@@ -178,7 +182,9 @@ def _started(drive: Capture, burst: Burst, known: Nameplate) -> Array:
     a start even at a standstill: it is tried again."""
     for _ in range(STARTS):
         values = replace(burst, angle_deg=known.swing_deg).shifted(_shift(drive, known)).values()
-        drive.prepare(values)  # before the rotor is brought to a standstill, which does not last
+        # Before the rotor is brought to a standstill, which does not last. A turn of it meanwhile changes the bounds by
+        # twice the offsets of the sensors at most.
+        drive.prepare(values)
         _brake(drive, known)
         rows = drive.pulse(values)
         if _phase_word(drive) != REFUSED or drive.get("fault_word"):

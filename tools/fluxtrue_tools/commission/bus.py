@@ -314,7 +314,8 @@ class OverTheBus:
         return self.get("speed_rpm")
 
     def free_speed_rpm(self) -> float:
-        """At once: the offsets of the sensors, which cannot be held at zero, turn a light rotor."""
+        """When the torque has fallen and the reported speed has followed. Not repeated: the offsets of the sensors,
+        which cannot be held at zero, turn a light rotor meanwhile."""
         return self.speed_rpm(SEEN_S + FALL_S)
 
     def push(self, current_A: complex, offset_A: complex = 0j) -> None:
@@ -322,8 +323,9 @@ class OverTheBus:
         self._line.ask(torque_Nm=self._torque_Nm(current_A.imag))
 
     def hold(self, offset_A: complex) -> None:
-        """Request no torque. A constant one against that of the offsets, which do not turn with the rotor, would take
-        away what holds it: it rests where their current makes no torque. The drive takes it for a wrong angle, too."""
+        """Request no torque. The rotor rests where the current of the sensors' offsets makes no torque. A constant
+        torque against that of the offsets would move it away from there, and the drive would take it for a wrong
+        angle."""
         self.let_go()
 
     def let_go(self) -> None:
@@ -367,6 +369,7 @@ class OverTheBus:
 
     def _arm(self, signals: Sequence[str], samples: int, divisor: int = 1) -> None:
         assert len(signals) <= SIGNALS_MAX
+        self._prepared = {}  # another setup than that of the pulses
         setup = make_setup(
             self._scope.signals, signals, "manual", None, 0.0, 0.0, min(samples, WORDS // len(signals)), divisor
         )

@@ -30,10 +30,10 @@ MOTORS = ROOT / "tests" / "motors"
 FOLDER, SMALL_FOLDER = MOTORS / "unknown", MOTORS / "unknown_48V"
 NAMEPLATES = {FOLDER.name: KINDS, SMALL_FOLDER.name: SMALL}
 FIRST_SEED = 100
-MOVED = "movement, deg"  # of the rotor in a burst of the map's pulses, electrical, from where it stood
-BOUNDS = {MOVED: 1.0}  # of what the steps at standstill must keep beside proof.STEPS
+MOVEMENT = "movement, deg"  # of the rotor in a burst of the map's pulses, electrical, from where it stood
+BOUNDS = {MOVEMENT: 1.0}  # of what the steps at standstill must keep beside proof.STEPS
 MAP = ("map rms, % of psi_max", "R, %", "R beyond the sensors' gains, %", "gain balance, %",
-       "largest current, % of i_max", MOVED)  # fmt: skip
+       "largest current, % of i_max", MOVEMENT)  # fmt: skip
 TURNING = ("wrong connections", "offset, deg", "psi_f, %", "inertia, %", "drag, %",
            "harmonics of the angle sensor, deg")  # fmt: skip
 

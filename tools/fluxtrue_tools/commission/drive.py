@@ -60,7 +60,7 @@ class Capture(Protocol):
         """Let the drive run."""
 
     def speed_rpm(self, seconds: float) -> float:
-        """Let the drive run; the speed at the end."""
+        """Let the drive run; the mean speed in this time, over CAN the reported one at its end."""
 
     def free_speed_rpm(self) -> float:
         """Let the drive run until a current of push() has fallen; return the speed."""
@@ -70,7 +70,8 @@ class Capture(Protocol):
         what they show without any."""
 
     def hold(self, offset_A: complex) -> None:
-        """The machine's torque is zero, although the sensors show their offsets, until a start of pulses."""
+        """No current in the machine, although the sensors show their offsets, until a start of pulses. Over CAN only
+        the requested torque is zero, and the current of the offsets remains."""
 
     def let_go(self) -> None:
         """No current and no torque is requested any more."""

@@ -76,7 +76,7 @@ def _inductance(linkage: Linkage, seconds: Array, of_q: bool) -> float:
 
 
 def _psi_d(linkage: Linkage, seconds: Array, psi_f_Vs: float) -> float:
-    """Of a level's mean current."""
+    """Flux linkage along d at a level's mean current, V·s."""
     return psi_f_Vs + float(linkage.i.real.mean()) * _inductance(linkage, seconds, of_q=False)
 
 

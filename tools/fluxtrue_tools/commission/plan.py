@@ -11,16 +11,17 @@ from fluxtrue_tools.commission.bursts import Burst, Raw, integrate, record
 from fluxtrue_tools.commission.drive import Capture
 from fluxtrue_tools.commission.impulse import Losses, balanced, magnet_Vs
 from fluxtrue_tools.commission.nameplate import Nameplate
-from fluxtrue_tools.commission.swing import QUIET_RAD, Waves, quietest, response
-from fluxtrue_tools.commission.swing import SHORT as REVERSALS_Q
+from fluxtrue_tools.commission.swing import LONG, SHORT, SWING_RAD, Waves, quietest, response
 from fluxtrue_tools.errors import FluxtrueError
 
 FIRST_VOLTAGE = 0.15  # with the smallest inductance that is allowed for, 0.2 of i_max in a period
 FIRST_CURRENT = 0.1  # of i_max
 VOLTAGES = (0.12, 0.69)
-TOGETHER = 0.8  # of both axes: beyond it the duties of a phase reach what the bridge can make, (MO-8)
-UNSEEN, SLOW = 0.55, 0.06  # the voltage at most where it would change the current by more of i_max in a period: a
+TOGETHER = 0.8  # root of the sum of the squares of both axes' voltages: beyond it the duties of a phase reach what the
+# bridge can make, (MO-8)
+UNSEEN = 0.55  # the largest voltage if that of VOLTAGES would change the current by SLOW or more in a period: a
 # saturation that is not known yet would let the current miss its bound
+SLOW = 0.06  # of i_max
 ABOVE_DROP = 1.8  # times what the winding drops
 STEP_D, STEP_Q = 0.12, 0.13  # of i_max: change of the current in a period at most
 BIAS_STEPS = (0.15, 0.2)  # of i_max: the same at a bias, where the last burst has shown the steepest change
@@ -39,6 +40,7 @@ TRAVEL = 1.5  # of the time to the bias without saturation
 REVERSALS_D = 4
 MOVED_RAD = 0.004  # electrical: by which a burst at a bias may move the rotor without a higher voltage for the next
 SMALLER = 0.9  # at least, of its bound, for a burst after one that has moved the rotor far
+LONG_LESS = 2.0  # times less than three half waves move five of them the rotor, (CM-41)
 
 
 @dataclass(frozen=True)
@@ -104,13 +106,15 @@ class Taken:
 
     raw: Raw
     share: float  # of the largest voltage
-    top_A: float
+    waves: Waves
     along_d_A: float = 0.0
 
     def quiet_A(self, top_A: float, share: float) -> float:
-        """The bound of the next burst, smaller if the movement of this one says that it would be too large: (CM-28)."""
-        moved_rad = self.raw.moved_rad * (top_A / self.top_A) ** 3 * (self.share / share) ** 2
-        return top_A * min(max((QUIET_RAD / max(moved_rad, QUIET_RAD)) ** (1.0 / 3.0), SMALLER), 1.0)
+        """The bound of a burst of three half waves: smaller if the movement of this one says that it would be too
+        large, (CM-28)."""
+        as_short = LONG_LESS if self.waves.reversals == LONG else 1.0
+        moved_rad = as_short * self.raw.moved_rad * (top_A / self.waves.high_A) ** 3 * (self.share / share) ** 2
+        return top_A * min(max((SWING_RAD / max(moved_rad, SWING_RAD)) ** (1.0 / 3.0), SMALLER), 1.0)
 
 
 def _waves(last: Raw, share: float, volts: float, top_A: float, half: float) -> Waves:
@@ -120,7 +124,7 @@ def _waves(last: Raw, share: float, volts: float, top_A: float, half: float) -> 
     half   where the first half wave has half of the impulse
     """
     if share < VOLTAGES[1]:
-        return Waves(-top_A, top_A, half, REVERSALS_Q)
+        return Waves(-top_A, top_A, half, SHORT)
     return quietest(response(last), share * volts, top_A)
 
 
@@ -181,7 +185,7 @@ def _ladder_q(drive: Capture, known: Nameplate, losses: Losses, volts: float, st
     for level in LEVELS:
         top_A = level * known.i_max_A
         share = _of_level(top_A, steepest_A, STEP_Q, known, losses, volts)
-        waves = Waves(-top_A, top_A, Burst.first, REVERSALS_Q)
+        waves = Waves(-top_A, top_A, Burst.first, SHORT)
         if taken:
             if share < VOLTAGES[1]:
                 top_A = taken[-1].quiet_A(top_A, share)
@@ -189,8 +193,8 @@ def _ladder_q(drive: Capture, known: Nameplate, losses: Losses, volts: float, st
             half = balanced(taken[-1].raw, losses, psi_f_Vs, top_A)
             waves = _waves(taken[-1].raw, share, volts, top_A, half)
         burst = _along_q(0.0, share, (-top_A, top_A), waves)
-        raw = _checked(record(drive, burst, known), "q", top_A)
-        taken.append(Taken(raw, share, top_A))
+        raw = _checked(record(drive, burst, known), "q", waves.high_A)
+        taken.append(Taken(raw, share, waves))
         steepest_A = max(_steepest(raw, share, of_q=True), steepest_A)
     return taken
 
@@ -214,7 +218,7 @@ def _at_biases(drive: Capture, found: First, known: Nameplate, losses: Losses,
         waves = _waves(last.raw, share, found.volts, top_A, half)
         raws.append(record(drive, _along_q(v_d, share, (target - band, target + band), waves, delay), known))
         if raws[-1].is_valid:
-            taken.append(Taken(raws[-1], share, top_A, target))
+            taken.append(Taken(raws[-1], share, waves, target))
     return raws[len(along_q) :]
 
 

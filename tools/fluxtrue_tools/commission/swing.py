@@ -13,11 +13,12 @@ import numpy as np
 from fluxtrue_tools.commission.bursts import Raw
 from fluxtrue_tools.motor.flux_model import Array
 
-DRAWS, PERIODS = 12, 600  # of the noise, and at most
+DRAWS = 12  # of the noise
+PERIODS = 1200  # that are computed; what has not ended by then is not taken
 UNCERTAIN = 0.015  # of the response
-FIRST, OTHER = np.linspace(0.4, 0.8, 21), np.linspace(0.8, 1.0, 11)  # shares of the bound that are tried
+FIRSTS, OTHERS = np.linspace(0.4, 0.8, 21), np.linspace(0.8, 1.0, 11)  # shares of the bound that are tried
 SHORT, LONG = 3, 5  # reversals
-QUIET_RAD = 0.0115  # electrical: of one degree, what a speed that is left may not add to
+SWING_RAD = 0.0115  # electrical, 0.66 degrees: up to one degree remains for a speed at the start
 SHARES = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75)  # of the bound
 
 
@@ -96,7 +97,7 @@ def farthest_rad(of: Response, volts: float, top_A: float, first: Array, other: 
         far = np.maximum(far, np.abs(angle))
         if not goes_on.any():
             break
-    return np.asarray(far.max(axis=1))
+    return np.asarray(np.where(goes_on, np.inf, far).max(axis=1))
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,7 @@ class Waves:
 
 def _best(of: Response, volts: float, top_A: float, reversals: int, others: Array) -> tuple[float, Waves]:
     """The shares that move the rotor least, and how far."""
-    first, other = (grid.ravel() for grid in np.meshgrid(FIRST, others, indexing="ij"))
+    first, other = (grid.ravel() for grid in np.meshgrid(FIRSTS, others, indexing="ij"))
     moved = farthest_rad(of, volts, top_A, first, other, reversals)
     at = int(np.argmin(moved))
     return float(moved[at]), Waves(-float(other[at]) * top_A, top_A, float(first[at]), reversals)
@@ -120,10 +121,10 @@ def _best(of: Response, volts: float, top_A: float, reversals: int, others: Arra
 def quietest(of: Response, volts: float, top_A: float) -> Waves:
     """Three half waves, by which the rotor swings to one side; if that is too far, five of which those against the
     first one are smaller, so that it swings by half of it to each side (CM-41); and if even that is too far, a smaller
-    bound."""
+    bound. If none is small enough, the last one: the rotor then moves by more than SWING_RAD."""
     for share in SHARES:
-        for reversals, others in ((SHORT, np.ones(1)), (LONG, OTHER)):
+        for reversals, others in ((SHORT, np.ones(1)), (LONG, OTHERS)):
             moved_rad, waves = _best(of, volts, share * top_A, reversals, others)
-            if moved_rad < QUIET_RAD:
+            if moved_rad < SWING_RAD:
                 return waves
     return waves
