@@ -26,15 +26,12 @@ from fluxtrue_tools.commission.bus import (
     OverTheBus,
     pulsing,
 )
-from fluxtrue_tools.commission.campaign import SMALL_FOLDER
-from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.drive import DONE, FAILED
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import balance_error, score
 from fluxtrue_tools.commission.steps import chosen, run
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.scope.xcp import XcpMaster, XcpRefused
-from fluxtrue_tools.sim import motor as motors
 from fluxtrue_tools.sim.motor import Motor
 from fluxtrue_tools.vecu.process import VirtualEcu
 from fluxtrue_tools.vecu.stepped import connect
@@ -90,12 +87,10 @@ def test_a_hidden_machine_is_measured_over_can(stand: Stand, unknown: Motor, kno
     assert stand.drive.get("dead_time_compensation") == pytest.approx(1.0, abs=1e-3)
 
 
-def test_a_light_rotor_stands_when_pulses_begin(tmp_path: Path) -> None:
+def test_a_light_rotor_stands_when_pulses_begin(small: Motor, plate: Nameplate, tmp_path: Path) -> None:
     """With the values set and the scope armed after the braking it turned with up to 47 degrees in a second, with the
     speed read as soon as the torque has ended with 43, and with torques shorter than a command's period with 66."""
-    motor = motors.load(str(SMALL_FOLDER))
-    plate = nameplate_of(SMALL_FOLDER, motor)
-    with bus_stand(motor, plate, tmp_path, ("hub", 103), connected=True, theta_m_rad=OFFSETS_ALONG_Q) as stand:
+    with bus_stand(small, plate, tmp_path, ("hub", 103), connected=True, theta_m_rad=OFFSETS_ALONG_Q) as stand:
         starts: list[float] = []
         offset_A, _ = offset(stand.drive)
         during(stand.drive, lambda: starts.append(plate.pole_pairs * stand.speed_rad_s()))

@@ -10,7 +10,6 @@ from watched import Watched
 
 from fluxtrue_tools.commission import drag, heating, hidden, iron, plot, spin, turning
 from fluxtrue_tools.commission.campaign import BOUNDS, FOLDER, MOVEMENT, NAMEPLATES, SMALL_FOLDER, draw
-from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.drag import Drag
 from fluxtrue_tools.commission.drive import SoftwareInTheLoop
 from fluxtrue_tools.commission.nameplate import Nameplate
@@ -24,16 +23,6 @@ from fluxtrue_tools.sim.motor import Motor
 
 SECONDS_MAX, SHARE_MAX = 60.0, 0.7
 PERIOD_S, PAIRS, PSI_F, INERTIA = 5e-5, 4, 0.02, 5e-4
-
-
-@pytest.fixture(scope="module")
-def small() -> Motor:
-    return motors.load(str(SMALL_FOLDER))
-
-
-@pytest.fixture(scope="module")
-def plate(small: Motor) -> Nameplate:
-    return nameplate_of(SMALL_FOLDER, small)
 
 
 def test_all_steps_of_a_light_machine_keep_every_bound(

@@ -9,12 +9,10 @@ from watched import Watched
 
 from fluxtrue_tools.commission import hidden, plan, swing
 from fluxtrue_tools.commission.bursts import Raw, record
-from fluxtrue_tools.commission.campaign import SMALL_FOLDER
-from fluxtrue_tools.commission.cli import nameplate_of
+from fluxtrue_tools.commission.impulse import Losses
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.steps import _enable
 from fluxtrue_tools.commission.swing import LONG, SHORT, Response, Waves
-from fluxtrue_tools.sim import motor as motors
 from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
 
@@ -22,16 +20,6 @@ VOLTS, TOP = 20.0, 40.0
 LEFT_RAD = 0.005  # electrical: of a speed before the pulses of 40 degrees in a second, and of noise
 EVEN = Response(0.005, 0.0, 0.0, 0.0, 1e-6)  # 0.1 A in a period: the bounds are met
 RIPPLED = Response(0.1, -0.005, -0.2, 0.13, 1.3e-6)  # 2 A: about that of anaheim 104
-
-
-@pytest.fixture(scope="module")
-def small() -> Motor:
-    return motors.load(str(SMALL_FOLDER))
-
-
-@pytest.fixture(scope="module")
-def plate(small: Motor) -> Nameplate:
-    return nameplate_of(SMALL_FOLDER, small)
 
 
 def farthest(of: Response, waves: Waves) -> float:
@@ -93,7 +81,10 @@ def test_only_at_the_highest_voltage_another_shape_is_needed(
     wanted = Waves(-30.0, 35.0, 0.5, LONG)
     monkeypatch.setattr(plan, "response", lambda _: RIPPLED)
     monkeypatch.setattr(plan, "quietest", lambda *_: wanted)
+    monkeypatch.setattr(plan, "magnet_Vs", lambda *_: 0.02)
+    monkeypatch.setattr(plan, "balanced", lambda *_: 0.6)
     nothing = np.zeros(3)
-    waves = plan._waves(Raw(nothing + 0j, nothing + 0j, nothing, nothing, 5e-5), share, 27.0, TOP, 0.6)
+    last = plan.Taken(Raw(nothing + 0j, nothing + 0j, nothing, nothing, 5e-5), share, Waves(-TOP, TOP, 0.7, SHORT))
+    waves = plan._waves([last], share, 27.0, TOP, Losses(0.0, 0.0), 0.02)
     assert (waves is wanted) == is_planned
     assert is_planned or waves == Waves(-TOP, TOP, 0.6, SHORT)

@@ -403,14 +403,16 @@ class OverTheBus:
             return round(value / (2.0 * np.pi) * 65536.0)
         return round(Q15 * value) if name in ("pulses_vd", "pulses_vq", "pulses_first") else round(value)
 
+    def _captured_periods(self, values: Mapping[str, float]) -> int:
+        return round(values["pulses_periods"] + MARGIN_S / self.period_s)
+
     def prepare(self, values: Mapping[str, float]) -> None:
         """What takes time before a start: the values are set, and the scope waits."""
         for field, name in enumerate(FIELDS):
             self._master.command(
                 USER, PULSE_SET, field, *(self._raw(name, values[name]) & 0xFFFF).to_bytes(2, "little")
             )
-        periods = round(values["pulses_periods"] + MARGIN_S / self.period_s)
-        self._arm([CAPTURED[name] for name in PULSE_SIGNALS], periods)
+        self._arm([CAPTURED[name] for name in PULSE_SIGNALS], self._captured_periods(values))
         self._prepared = dict(values)
 
     def pulse(self, values: Mapping[str, float]) -> Array:
@@ -418,7 +420,7 @@ class OverTheBus:
         if self._prepared != values:
             self.prepare(values)
         self._prepared = {}
-        begun_s, periods = self._line.now_s, round(values["pulses_periods"] + MARGIN_S / self.period_s)
+        begun_s, periods = self._line.now_s, self._captured_periods(values)
         self._trigger()
         self._master.command(USER, PULSE_START)
         phase = self._until_ended()

@@ -97,7 +97,6 @@ class SoftwareInTheLoop:
         self.period_s = loop.period_s
         self.passed: Callable[[float], None] = nothing
         self.lightness = LIGHTNESS
-        self._is_held = False
 
     @staticmethod
     def _allowed(name: str) -> str:
@@ -149,7 +148,6 @@ class SoftwareInTheLoop:
 
     def push(self, current_A: complex, offset_A: complex = 0j) -> None:
         """References of the current control."""
-        self._is_held = False
         shown_A = current_A + (offset_A * cmath.exp(-1j * self.get("theta_e_rad")) if offset_A else 0j)
         self.set("current_mode", 1.0)
         self.set("id_ref_A", shown_A.real)
@@ -158,11 +156,9 @@ class SoftwareInTheLoop:
     def hold(self, offset_A: complex) -> None:
         """References as the sensors' offsets."""
         self.push(0j, offset_A)
-        self._is_held = True
 
     def let_go(self) -> None:
         """Remove all references."""
-        self._is_held = False
         self.set("id_ref_A", 0.0)
         self.set("iq_ref_A", 0.0)
         self.set("current_mode", 0.0)
@@ -174,8 +170,7 @@ class SoftwareInTheLoop:
         """Recorded from before their start to after their end."""
         for name, value in values.items():
             self.set(name, value)
-        if self._is_held:
-            self.let_go()
+        self.let_go()
         self.set("pulses", PULSE)
         parts = [self.capture(SIGNALS, CHUNK)]
         while parts[-1][-1, -1] not in (DONE, FAILED):

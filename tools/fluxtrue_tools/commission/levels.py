@@ -114,16 +114,16 @@ class _Equations:
     """(CM-12) of all levels. The common unknowns: resistance, voltage of a leg, error of the mean voltage."""
 
     def __init__(self, raws: Sequence[Raw], noises: Sequence[Noise], psi_f_Vs: float) -> None:
-        self._levels = [_Level(raw, noise) for raw, noise in zip(raws, noises, strict=True)]
+        self.levels = [_Level(raw, noise) for raw, noise in zip(raws, noises, strict=True)]
         self._of_r = self._all(lambda level: -level.linkage.of_r.real)
         self._seconds = self._all(lambda level: level.seconds)
         self._values = self._all(
             lambda level: level.linkage.psi.real - _of_movement(level.linkage, level.seconds, psi_f_Vs)
         )
-        self.spare = sum(level.spare for level in self._levels) - COMMON
+        self.spare = sum(level.spare for level in self.levels) - COMMON
 
     def _all(self, column: Callable[[_Level], Array]) -> Array:
-        return np.concatenate([level.left(column(level)) for level in self._levels])
+        return np.concatenate([level.left(column(level)) for level in self.levels])
 
     def rows(self, knee_A: float) -> Array:
         """A column for each common unknown."""
@@ -157,12 +157,10 @@ class _Equations:
         return math.sqrt(covariance[0, 0]) / float(scale[0])
 
 
-def _of_angle(raw: Raw, psi_f_Vs: float, angle_rad: float) -> Array:
+def _of_angle(linkage: Linkage, seconds: Array, psi_f_Vs: float, angle_rad: float) -> Array:
     """What the integral of u_d contains of the linkage that a movement gives to the other axis, with an error of the
     angle: (CM-42)."""
-    linkage = integrate(raw, 0.0)
-    psi_d = _psi_d(linkage, raw.period_s * np.arange(len(raw.i)), psi_f_Vs)
-    return np.asarray(angle_rad * psi_d * linkage.turned.imag)
+    return np.asarray(angle_rad * _psi_d(linkage, seconds, psi_f_Vs) * linkage.turned.imag)
 
 
 def _noises(raws: Sequence[Raw], noise_A: float, psi_f_Vs: float, angle_rad: float) -> list[Noise]:
@@ -172,13 +170,12 @@ def _noises(raws: Sequence[Raw], noise_A: float, psi_f_Vs: float, angle_rad: flo
     first = _Equations(raws, plain, psi_f_Vs)
     x, left = first.solve(first.rows(0.0))
     sigma = math.sqrt(left / first.spare)
-    return [
-        Noise(
-            np.full(len(raw.i), sigma),
-            np.column_stack((x[1] * of_phases(raw, noise_A).real, _of_angle(raw, psi_f_Vs, angle_rad))),
-        )
-        for raw in raws
-    ]
+    noises = []
+    for level in first.levels:
+        of_signs = x[1] * of_phases(level.raw, noise_A).real
+        of_angle = _of_angle(level.linkage, level.seconds, psi_f_Vs, angle_rad)
+        noises.append(Noise(np.full(len(of_angle), sigma), np.column_stack((of_signs, of_angle))))
+    return noises
 
 
 def solve(raws: list[Raw], psi_f_Vs: float, compensated_V: float = 0.0, noise_A: float = 0.0,

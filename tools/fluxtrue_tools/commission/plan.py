@@ -117,15 +117,21 @@ class Taken:
         return top_A * min(max((SWING_RAD / max(moved_rad, SWING_RAD)) ** (1.0 / 3.0), SMALLER), 1.0)
 
 
-def _waves(last: Raw, share: float, volts: float, top_A: float, half: float) -> Waves:
+def _waves(taken: Sequence[Taken], share: float, volts: float, top_A: float, losses: Losses, guess_Vs: float,
+           more_A: float = 0.0, more_Vs: float = 0.0) -> Waves:  # fmt: skip
     """Of the next burst. What moves the rotor less is a higher voltage; only where there is none is it slow enough, and
     of so little saturation, that its movement can be computed.
 
-    half   where the first half wave has half of the impulse
+    volts             of a share of 1
+    guess_Vs          of the magnet
+    more_A, more_Vs   current and flux linkage along d that the next burst has more than the last one
     """
-    if share < VOLTAGES[1]:
-        return Waves(-top_A, top_A, half, SHORT)
-    return quietest(response(last), share * volts, top_A)
+    last = taken[-1]
+    if share >= VOLTAGES[1]:
+        return quietest(response(last.raw), share * volts, top_A)
+    top_A = last.quiet_A(top_A, share)
+    psi_f_Vs = magnet_Vs([each.raw for each in taken], losses, guess_Vs)
+    return Waves(-top_A, top_A, balanced(last.raw, losses, psi_f_Vs, top_A, more_A, more_Vs), SHORT)
 
 
 def _along_q(v_d: float, share: float, d: tuple[float, float], waves: Waves, delay: int = 0) -> Burst:
@@ -187,11 +193,7 @@ def _ladder_q(drive: Capture, known: Nameplate, losses: Losses, volts: float, st
         share = _of_level(top_A, steepest_A, STEP_Q, known, losses, volts)
         waves = Waves(-top_A, top_A, Burst.first, SHORT)
         if taken:
-            if share < VOLTAGES[1]:
-                top_A = taken[-1].quiet_A(top_A, share)
-            psi_f_Vs = magnet_Vs([each.raw for each in taken], losses, known.psi_f_Vs)
-            half = balanced(taken[-1].raw, losses, psi_f_Vs, top_A)
-            waves = _waves(taken[-1].raw, share, volts, top_A, half)
+            waves = _waves(taken, share, volts, top_A, losses, known.psi_f_Vs)
         burst = _along_q(0.0, share, (-top_A, top_A), waves)
         raw = _checked(record(drive, burst, known), "q", waves.high_A)
         taken.append(Taken(raw, share, waves))
@@ -204,22 +206,18 @@ def _at_biases(drive: Capture, found: First, known: Nameplate, losses: Losses,
     """Along q at each bias of d, each planned from the last burst that is valid."""
     i_max_A, steep_d = known.i_max_A, found.volts * drive.period_s / found.l_d_H
     band = BAND * i_max_A
-    taken, raws = list(along_q), [each.raw for each in along_q]
+    taken, raws = list(along_q), []
     for bias in np.repeat(BIASES, BURSTS):
-        target, last = -bias * i_max_A, taken[-1]
+        target = -bias * i_max_A
         share, top_A = at_bias(taken[-2:], abs(target) + band, i_max_A)
         v_d = min(_voltage(steep_d, i_max_A, BAND_STEP), math.sqrt(TOGETHER**2 - share**2))
         delay = math.ceil(TRAVEL * bias * i_max_A / (v_d * steep_d))
-        more_A = target - last.along_d_A
-        psi_f_Vs = magnet_Vs([raw for raw in raws if raw.is_valid], losses, known.psi_f_Vs)
-        if share < VOLTAGES[1]:
-            top_A = last.quiet_A(top_A, share)
-        half = balanced(last.raw, losses, psi_f_Vs, top_A, more_A, found.l_d_H * more_A)
-        waves = _waves(last.raw, share, found.volts, top_A, half)
+        more_A = target - taken[-1].along_d_A
+        waves = _waves(taken, share, found.volts, top_A, losses, known.psi_f_Vs, more_A, found.l_d_H * more_A)
         raws.append(record(drive, _along_q(v_d, share, (target - band, target + band), waves, delay), known))
         if raws[-1].is_valid:
             taken.append(Taken(raws[-1], share, waves, target))
-    return raws[len(along_q) :]
+    return raws
 
 
 def sweep(drive: Capture, found: First, known: Nameplate, losses: Losses) -> list[Raw]:

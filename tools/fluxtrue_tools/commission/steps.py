@@ -25,6 +25,7 @@ from fluxtrue_tools.commission.surface import Surface
 from fluxtrue_tools.errors import FluxtrueError
 
 SETTLE_S = 0.05
+ANGLE_RAD = 0.03  # electrical: of the angle that `phases` finds, and of a sensor with harmonics
 
 
 @dataclass
@@ -170,8 +171,6 @@ def _map(drive: Capture, found: Found, known: Nameplate) -> None:
     found.surface = surface.fit(alike, found.balance.noise_A, known.i_max_A, found.resistance.r_ohm,
                                 (known.psi_f_Vs, error), found.resistance.total_V, found.resistance.knee_A)  # fmt: skip
 
-
-ANGLE_RAD = 0.03  # electrical: of the angle that `phases` finds, and of a sensor with harmonics
 
 STEPS = (
     Step("offsets", "switching is disabled, nothing moves, no current", _offsets, 0.15),
