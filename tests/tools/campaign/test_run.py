@@ -88,6 +88,19 @@ def test_the_command_of_a_case_reproduces_its_numbers_and_stores_nothing(folder:
     assert sorted(p.name for p in folder.iterdir() if p.name != "case.png") == before
 
 
+def test_a_controller_can_run_in_the_first_cases_only(folder: Path, whole: pd.DataFrame) -> None:
+    (folder / "few.toml").write_text(SMALL.replace('name = "paper"', 'name = "paper"\ncases = 1'))
+    result = campaign("few.toml", "--out", "few", "--cases", 2, cwd=folder)
+    assert result.returncode == 0, result.stderr
+    expected = whole[(whole["case"] == 0) | ((whole["case"] == 1) & (whole["controller"] == "tables"))]
+    pd.testing.assert_frame_equal(results(folder, "few"), expected.reset_index(drop=True), check_exact=True)
+    assert "paper runs on 1 of them only" in (folder / "few" / "report.html").read_text()
+    one = campaign("few.toml", "--case", 1, "--plot", "one.png", cwd=folder)
+    assert one.returncode == 0, one.stderr
+    assert "tables N·m" in one.stdout
+    assert "paper" not in one.stdout
+
+
 def _cases(folder: Path, out: str) -> list[Path]:
     return sorted(folder.glob(f"{out}/cases/case-*.parquet"))
 

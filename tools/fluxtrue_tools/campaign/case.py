@@ -74,13 +74,15 @@ def _controller_rows(campaign: Campaign, machine: Machine, plan: Plan, controlle
 
 def run_case(campaign: Campaign, machine: Machine, case: int,
              keep: Callable[[str, Trace], None] | None = None) -> list[dict[str, Any]]:  # fmt: skip
-    """All controllers of a case, a row per window; the same numbers wherever and whenever it runs."""
+    """All controllers that run in a case, a row per window; the same numbers wherever and whenever it runs."""
     plan = make_plan(campaign, machine, case)
     if not plan.windows:
         return []  # this plant cannot reach the smallest torque at any speed
     truth = {f"plant_{name}": value for name, value in plan.sample.factors.items()}
     rows = []
     for controller in campaign.controller:
+        if not controller.runs_in(case):
+            continue
         trace = run_controller(campaign, machine, plan, controller)
         if keep is not None:
             keep(controller.name, trace)

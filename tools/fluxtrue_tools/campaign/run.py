@@ -96,4 +96,4 @@ def one_case(campaign: Campaign, folder: MotorFolder, case: int, files: Outputs,
                             f"{campaign.windows.torque_min_Nm:g} N·m at none of its speeds")  # fmt: skip
     if plot is not None:
         _draw(figures.case_figure(campaign, traces, f"{Path(where).stem}, case {case}"), files.scratch(plot))
-    return terminal.case_table(campaign, table)
+    return terminal.case_table(table)

@@ -101,11 +101,17 @@ class Windows(Strict):
 
 
 class Controller(Strict):
-    """One way to run the firmware: names and numbers as fluxtrue_set() takes them."""
+    """One way to run the firmware: names and numbers as fluxtrue_set() takes them. With `cases`, it runs in so many of
+    the first cases only."""
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,23}$")]
     set: dict[str, Flag]
     warm_up: bool = True
+    cases: Annotated[int, Field(ge=1, le=100000)] | None = None
+
+    def runs_in(self, case: int) -> bool:
+        """Whether this controller is measured in a case."""
+        return self.cases is None or case < self.cases
 
 
 class Limits(Strict):
@@ -161,6 +167,10 @@ class Campaign(Strict):
                              f"{self.check.band_rpm:g}")  # fmt: skip
         if self.check.controllers and self.check.reference not in names:
             raise ValueError(f"check.reference: '{self.check.reference}', allowed: {', '.join(names)}")
+        for controller in self.controller:
+            if controller.cases is not None and controller.name in {*self.check.controllers, self.check.reference}:
+                raise ValueError(f"controller.{names.index(controller.name)}.cases: {controller.cases}, allowed: for "
+                                 "a controller outside check.controllers that is not check.reference")  # fmt: skip
         return self
 
     def digest(self) -> str:

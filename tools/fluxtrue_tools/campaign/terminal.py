@@ -70,12 +70,13 @@ def promises(campaign: Campaign, scores: list[Score]) -> list[tuple[str, Bound]]
     return [(s.controller, bound) for s in scores if s.controller in checked for bound in bounds(campaign, s)]
 
 
-def case_table(campaign: Campaign, table: pd.DataFrame) -> str:
-    """One case: its plant, then every window with all controllers side by side, in ten digits for exact comparison."""
+def case_table(table: pd.DataFrame) -> str:
+    """One case: its plant, then every window with the controllers that run in it side by side, in ten digits for exact
+    comparison."""
     first = table.iloc[0]
     plant = "\n".join(f"{name.removeprefix('plant_')} = {first[name]:.10g}"
                       for name in table.columns if name.startswith("plant_"))  # fmt: skip
-    names = [controller.name for controller in campaign.controller]
+    names = list(table["controller"].unique())
     cells: list[tuple[str, ...]] = [("window", "rpm", "requested N·m", *(f"{name} N·m" for name in names),
                                      *(f"{name} %" for name in names), "bound %")]  # fmt: skip
     for window, rows in table.set_index("controller").groupby("window"):
