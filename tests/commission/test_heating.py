@@ -4,7 +4,8 @@
 import pytest
 
 from fluxtrue_tools.commission import hidden
-from fluxtrue_tools.commission.heating import Metered, measure
+from fluxtrue_tools.commission.heating import measure
+from fluxtrue_tools.commission.metered import Metered
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.steps import ALL, NEEDS
 from fluxtrue_tools.sim.library import Loop

@@ -8,7 +8,7 @@ loop; over CAN most of the time passes without current, while captures are read.
 """
 
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import click
 import numpy as np
@@ -17,30 +17,13 @@ from fluxtrue_tools.cli import run_module
 from fluxtrue_tools.commission import hidden
 from fluxtrue_tools.commission.campaign import FOLDER, KINDS, MOTORS, NAMEPLATES, draw
 from fluxtrue_tools.commission.cli import nameplate_of
-from fluxtrue_tools.commission.drive import Capture, SoftwareInTheLoop
+from fluxtrue_tools.commission.drive import Capture
+from fluxtrue_tools.commission.metered import Metered
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.steps import ALL, Step, chosen, run
-from fluxtrue_tools.motor.flux_model import Array
 from fluxtrue_tools.sim import motor as motors
 from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
-
-TRUTH = ("truth.i_d_A", "truth.i_q_A")
-
-
-class Metered(SoftwareInTheLoop):
-    """Adds up time and squared current of the machine; what a commissioning sees of the drive is unchanged."""
-
-    def __init__(self, loop: Loop) -> None:
-        super().__init__(loop)
-        self.seconds, self.square_A2s = 0.0, 0.0
-
-    def capture(self, names: Sequence[str], periods: int) -> Array:
-        """As SoftwareInTheLoop.capture()."""
-        rows = self._recorded([*map(self._allowed, names), *TRUTH], periods)
-        self.seconds += periods * self.period_s
-        self.square_A2s += float(np.square(rows[:, -2:]).sum()) * self.period_s
-        return rows[:, :-2]
 
 
 def measure(name: str, seed: int, motor: Motor, known: Nameplate) -> dict[str, tuple[float, float]]:

@@ -10,6 +10,7 @@ import numpy as np
 from fluxtrue_tools.commission.balance import Balance
 from fluxtrue_tools.commission.hidden import Truth
 from fluxtrue_tools.commission.iron import Iron
+from fluxtrue_tools.commission.plan import FIRST_CURRENT, First
 from fluxtrue_tools.commission.spin import Spun
 from fluxtrue_tools.commission.steps import Found
 from fluxtrue_tools.motor.flux_model import FluxModel
@@ -49,10 +50,38 @@ def resistance_error(r_ohm: float, truth: Truth) -> tuple[float, float]:
     return share - 1.0, share / gain - 1.0
 
 
+def _order(truth: Truth) -> str:
+    """The sensors are exchanged with the leads."""
+    return "acb" if truth.plant.get("phases_swapped", 0.0) else "abc"
+
+
 def balance_error(balance: Balance, truth: Truth) -> float:
     """The largest error of the difference between two sensors' gains."""
-    order = "acb" if truth.plant.get("phases_swapped", 0.0) else "abc"  # the sensors are exchanged with the leads
-    return float(np.ptp(balance.gains - [truth.plant[f"current_gain_{phase}"] for phase in order]))
+    return float(np.ptp(balance.gains - [truth.plant[f"current_gain_{phase}"] for phase in _order(truth)]))
+
+
+def offset_error(offset_A: complex, truth: Truth) -> float:
+    """Of the current sensors' offsets, a share of their full scale."""
+    plant = truth.plant
+    true_A = sum(2.0 / 3.0 * plant[f"current_offset_A_{phase}"] * cmath.rect(1.0, 2.0 * math.pi * k / 3.0)
+                 for k, phase in enumerate(_order(truth)))  # fmt: skip
+    return abs(offset_A - true_A) / plant["current_full_scale_A"]
+
+
+def leg_errors(total_V: float, truth: Truth, guess_V: float) -> tuple[float, float]:
+    """Of the voltage that a leg loses, as the sensor of the dc voltage shows it: the error, V, and which share it is of
+    the nameplate's error."""
+    plant = truth.plant
+    true_V = plant["vdc_gain"] * (plant["dead_time_s"] * plant["pwm_hz"] * plant["vdc_V"] + plant["device_drop_V"])
+    return total_V - true_V, (total_V - true_V) / (guess_V - true_V)
+
+
+def inductance_error(first: First, truth: Truth, i_max_A: float) -> float:
+    """The larger of both axes, against the slope of the flux linkages over the currents of the first pulses."""
+    i_A = FIRST_CURRENT * i_max_A
+    true_H = [float(truth.psi_d(i_A, 0.0) - truth.psi_d(-i_A, 0.0)) / (2.0 * i_A),
+              float(truth.psi_q(0.0, i_A) - truth.psi_q(0.0, -i_A)) / (2.0 * i_A)]  # fmt: skip
+    return max(abs(found / true - 1.0) for found, true in zip(first.found_H, true_H, strict=True))
 
 
 def iron_error(found: Iron | None, truth: Truth) -> float:
