@@ -15,6 +15,7 @@ from fluxtrue_tools.bus.options import can_bus_or
 if TYPE_CHECKING:
     from fluxtrue_tools.commission.drive import Capture
     from fluxtrue_tools.commission.nameplate import Nameplate
+    from fluxtrue_tools.commission.steps import Step
     from fluxtrue_tools.commission.work import Work
     from fluxtrue_tools.sim.motor import Motor
 
@@ -50,7 +51,7 @@ class Target:
     def check(self) -> None:
         """Refuse options that this target does not have."""
         if self.interface is None:
-            paths.refuse_given("without --can-interface", "can_channel", "can_option", "bench", "elf")
+            paths.refuse_given("without --can-interface", "can_channel", "can_option", "bench", "elf", "yes")
         else:
             paths.refuse_given("with --can-interface", "machine", "seed", "virtual_ecu")
         if self.elf is not None:
@@ -96,6 +97,25 @@ class Target:
             yield stack.enter_context(on_the_bus.connected(bench, motor, known))
 
 
+def consented(steps: "list[Step]", known: "Nameplate") -> None:
+    """Ask for a consent to each movement of the shaft, also of the steps that a named one needs, before anything is
+    enabled; without a terminal they are refused."""
+    import sys
+
+    from fluxtrue_tools.commission.steps import TURNING, announcement
+    from fluxtrue_tools.errors import FluxtrueError
+
+    moving = [step for step in steps if step.name in TURNING]
+    if moving and not sys.stdin.isatty():
+        names = ", ".join(step.name for step in moving)
+        raise FluxtrueError(f"--step: {names}: the shaft turns, allowed: on a terminal, which asks for each movement, "
+                            "or with --yes")  # fmt: skip
+    for step in moving:
+        click.echo(f"{step.name}: {announcement(step, known)}")
+        if not click.confirm("The shaft is uncoupled and nothing can be caught by it: may it turn as described?"):
+            raise FluxtrueError(f"commission: {step.name}: without consent; nothing was done")
+
+
 @click.command("commission", cls=paths.Command)
 @click.option("--motor", "nameplate", required=True, type=paths.InputFolder(), metavar="DIR",
               help="The folder that `fluxtrue motor start` has made.")  # fmt: skip
@@ -113,18 +133,19 @@ class Target:
 @click.option("--out", type=paths.OutputFolder(*WRITTEN), metavar="DIR", help="The motor's folder.")
 @click.option("--work", type=paths.BuildFolder(), metavar="DIR", help="Keep the finished steps here.")
 @click.option("--resume", is_flag=True, help="Go on after the steps that --work has.")
+@click.option("--yes", is_flag=True, help="On a bench: consent to every movement that is announced.")
 @click.option("--dry-run", is_flag=True, help="Only say what will move and how much current will flow.")
 def commission(nameplate: Path, machine: str, seed: int, virtual_ecu: bool, can_interface: str | None,
                can_channel: str, can_option: tuple[tuple[str, Any], ...], bench: tuple[str, int] | None,
-               elf: Path | None, steps: str, out: Path | None, work: Path | None, resume: bool,
+               elf: Path | None, steps: str, out: Path | None, work: Path | None, resume: bool, yes: bool,
                dry_run: bool) -> None:  # fmt: skip
     """Measure an unknown motor with an uncoupled shaft, by software in the loop or over CAN.
 
     The steps phases, spin and drag turn the shaft; the simulated machine's sensor and leads are then connected at
-    random. The others keep it at standstill and need the connection to be right.
+    random. The others keep it at standstill and need the connection to be right. With --can-interface each movement
+    needs a consent.
     """
-    from fluxtrue_tools.commission import result
-    from fluxtrue_tools.commission.hidden import folder_of
+    from fluxtrue_tools.commission import hidden, result
     from fluxtrue_tools.commission.steps import announcement, chosen, run
     from fluxtrue_tools.errors import FluxtrueError
     from fluxtrue_tools.sim import motor as motors
@@ -132,7 +153,7 @@ def commission(nameplate: Path, machine: str, seed: int, virtual_ecu: bool, can_
     wanted = chosen(tuple(steps.split(",")))
     target = Target(machine, seed, virtual_ecu, can_interface, can_channel, dict(can_option), bench, elf)
     target.check()
-    folder_of(machine)
+    hidden.folder_of(machine)
     if out is None and not dry_run:
         raise FluxtrueError("--out: missing, wanted: a folder for the result, or --dry-run")
     if resume and work is None:
@@ -146,10 +167,11 @@ def commission(nameplate: Path, machine: str, seed: int, virtual_ecu: bool, can_
         for step in wanted:
             click.echo(f"{step.name}: {announcement(step, known)}")
         return
+    if can_interface is not None and not yes:
+        consented([step for step in wanted if earlier is None or step.name not in earlier[0]], known)
     with paths.outputs() as outputs:
         staging = outputs.scratch(out)
         with target.drive(motor, known, connected) as drive:
             found = run(drive, wanted, known, click.echo, kept, earlier)
         text, _ = result.write(found, known, nameplate, staging, out)
-    click.echo(text, nl=False)
-    click.echo(f"written to {out}")
+    click.echo(f"{text}written to {out}")

@@ -22,6 +22,9 @@ COAST_END = 0.4
 SLOWEST = 0.1  # of the largest speed of the run: below it the drag is not evaluated
 LEAST_SHARE = 0.2  # of the largest current of the run
 BENDS = (-8.0, 1.0)  # of psi_f: what i_max along q may add to psi_d with the slope at small currents, the steepest
+SHOWN = (0.4, 1.0)  # of the largest speed of the run: where the drag is shown
+HEAVY = 3.0  # times the nameplate's guess of the inertia; of the simulated machines none has more than 1.9
+FINE_KGM2 = 1e-3  # below it an inertia is shown in kg·mm²
 D = TypeVar("D", bound=Capture)
 STEADY_SHARE = 0.05  # change of a current within a window in which it counts as steady
 
@@ -37,11 +40,45 @@ class Drag:
     square_Nms2: float
     from_rad_s: float
     to_rad_s: float
+    slow_sigma_Nm: float = 0.0  # of the torque at SHOWN of to_rad_s, by the noise of the speed
+    fast_sigma_Nm: float = 0.0
+
+    def shown(self) -> list[tuple[float, float, float]]:
+        """Speed, drag and its uncertainty at SHOWN of the speed of the run, rad/s and N·m."""
+        return [(share * self.to_rad_s, float(self.torque_Nm(np.array(share * self.to_rad_s))), sigma_Nm)
+                for share, sigma_Nm in zip(SHOWN, (self.slow_sigma_Nm, self.fast_sigma_Nm), strict=True)]  # fmt: skip
 
     def torque_Nm(self, speed_rad_s: Array) -> Array:
         """The torque at speeds between the two."""
         w = np.abs(np.asarray(speed_rad_s, float))
         return self.constant_Nm + self.linear_Nms * w + self.square_Nms2 * w**2
+
+
+def _plain(value: float, digits: int) -> str:
+    """Without an exponent."""
+    places = digits - 1 - math.floor(math.log10(abs(value))) if value else 0
+    return f"{round(value, places):.{max(places, 0)}f}"
+
+
+def inertia_text(kgm2: float, digits: int, like_kgm2: float = 0.0) -> str:
+    """With its unit, in a size that can be read.
+
+    like_kgm2   in the unit of this inertia
+    """
+    scale, unit = (1e6, "kg·mm²") if (like_kgm2 or kgm2) < FINE_KGM2 else (1.0, "kg·m²")
+    return f"{_plain(scale * kgm2, digits)} {unit}"
+
+
+def coupled(found: Drag, known: Nameplate) -> str:
+    """A warning where something heavy turns with the rotor; it costs nothing but time, and inertia and drag include it.
+
+    known   before anything was measured: its inertia is the guess for a machine of this voltage, current and speed
+    """
+    times = found.inertia_kgm2 / known.inertia_kgm2
+    if times <= HEAVY:
+        return ""
+    return (f"the inertia is {times:.1f} times the {inertia_text(known.inertia_kgm2, 2)} that are guessed for a rotor "
+            "of this nameplate: is the shaft coupled? Inertia and drag then contain the load")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -144,20 +181,30 @@ def evaluate(parts: list[Array], period_s: float, known: Nameplate, periods: int
     changes = [_changes(run, flux.torque_Nm(run.rows[:, 0] + 1j * run.rows[:, 1], pole_pairs), spacing_s, SLOWEST * top)
                for run in runs]  # fmt: skip
     matrix, change = np.vstack([part for part, _ in changes]), np.concatenate([part for _, part in changes])
-    x, sigma = _least_squares(matrix, change)
+    x, covariance = _least_squares(matrix, change)
     inertia = 1.0 / float(x[0])
     constant, linear, square = (float(inertia * each) for each in x[1:])
-    return Drag(inertia, sigma * inertia**2, constant, linear, square, SLOWEST * top, top)
+    sigmas = [_torque_sigma(x, covariance, share * top) for share in SHOWN]
+    return Drag(
+        inertia, math.sqrt(covariance[0, 0]) * inertia**2, constant, linear, square, SLOWEST * top, top, *sigmas
+    )
 
 
-def _least_squares(matrix: Array, values: Array) -> tuple[Array, float]:
-    """The solution, and the standard deviation of its first unknown."""
+def _torque_sigma(x: Array, covariance: Array, w: float) -> float:
+    """Of (x1 + x2 w + x3 w^2) / x0."""
+    powers = np.array([1.0, w, w * w])
+    slope = np.concatenate(([-float(x[1:] @ powers) / x[0]], powers)) / x[0]
+    return math.sqrt(float(slope @ covariance @ slope))
+
+
+def _least_squares(matrix: Array, values: Array) -> tuple[Array, Array]:
+    """The solution and its covariance."""
     scale = np.linalg.norm(matrix, axis=0)
     x, *_ = np.linalg.lstsq(matrix / scale, values, rcond=None)
     left = values - matrix / scale @ x
     variance = float(left @ left) / max(len(values) - len(x), 1)
     inverse = np.linalg.inv((matrix / scale).T @ (matrix / scale))
-    return x / scale, math.sqrt(variance * inverse[0, 0]) / float(scale[0])
+    return x / scale, variance * inverse / np.outer(scale, scale)
 
 
 def _coast(drive: Capture, wanted_rad_s: float) -> Array:

@@ -4,9 +4,8 @@
 import math
 from typing import Final
 
-import numpy as np
-
 from fluxtrue_tools.commission import iron
+from fluxtrue_tools.commission.drag import coupled, inertia_text
 from fluxtrue_tools.commission.harmonics import LARGE_RAD, SIGMAS, Harmonics, Wave
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.steps import Found
@@ -53,10 +52,15 @@ def _turning(found: Found, known: Nameplate) -> list[str]:
                      f"{1e6 * spun.lag_s:.1f} us")  # fmt: skip
         lines += _harmonics(spun.harmonics)
     if found.drag is not None:
-        drag = found.drag
-        ends = ", ".join(f"{drag.torque_Nm(np.array(w)):.3g} N·m at {30.0 * w / math.pi:.0f} rpm"
-                         for w in (0.4 * drag.to_rad_s, drag.to_rad_s))  # fmt: skip
-        lines.append(f"inertia: {drag.inertia_kgm2:.4g} kg m^2, ±{drag.inertia_sigma_kgm2:.1g}; drag {ends}")
+        at, guess = found.drag, known.inertia_kgm2
+        inertia, sigma = (inertia_text(each, digits, at.inertia_kgm2)
+                          for each, digits in ((at.inertia_kgm2, 4), (at.inertia_sigma_kgm2, 1)))  # fmt: skip
+        ends = ", ".join(f"{torque_Nm:.3g} ±{sigma_Nm:.1g} N·m at {30.0 * w / math.pi:.0f} rpm"
+                         for w, torque_Nm, sigma_Nm in at.shown())  # fmt: skip
+        lines.append(f"inertia: {inertia}, ±{sigma} (guessed for a rotor of this nameplate: {inertia_text(guess, 2)}); "
+                     f"drag {ends}; ± by the noise")  # fmt: skip
+        if warned := coupled(at, known):
+            lines.append(f"  {warned}")
     return lines
 
 
@@ -64,12 +68,13 @@ def _levels(found: Found, known: Nameplate) -> list[str]:
     r = found.resistance
     if r is None or found.first is None:
         return []
+    l_d_H, l_q_H = found.first.found_H
     knee = f"; half of it at a knee of {r.knee_A:.2g} A" if r.knee_A > 0.0 else ""
     return [
         f"resistance: {1e3 * r.r_ohm:.4g} mohm, ±{1e3 * r.r_sigma_ohm:.1g} mohm beyond the sensors' gains (guessed "
         f"{1e3 * known.r_ohm:.4g} mohm)",
         f"inverter: a leg loses {r.total_V:.3g} V, {r.level_V:+.3g} V more than is compensated{knee}",
-        f"inductances at small currents: {1e3 * found.first.l_d_H:.4g} mH (d), {1e3 * found.first.l_q_H:.4g} mH (q)",
+        f"inductances at small currents: {1e3 * l_d_H:.3g} mH (d), {1e3 * l_q_H:.3g} mH (q)",
     ]
 
 

@@ -148,7 +148,9 @@ def _resistance(drive: Capture, found: Found, known: Nameplate) -> None:
     found.resistance = levels.solve(
         alike, known.psi_f_Vs, drive.get("compensation_V"), found.balance.noise_A, angle_rad
     )
-    found.first = plan.first(drive, known, _losses(found, known))
+    legs = plan.Legs(found.resistance.total_V, found.resistance.knee_A, found.resistance.compensated_V,
+                     drive.get("compensation_knee_A"))  # fmt: skip
+    found.first = plan.first(drive, known, _losses(found, known), legs)
 
 
 def _map(drive: Capture, found: Found, known: Nameplate) -> None:
@@ -176,12 +178,14 @@ STEPS = (
     Step("offsets", "switching is disabled, nothing moves, no current", _offsets, 0.15),
     Step(connection.NAME, "a current of up to {vector:.3g} A that does not turn with the rotor: the shaft turns "
          "slowly, by up to {turns:g} turns divided by the pole pairs, and back", _phases, 10.0, 20.0),
-    Step(spin.NAME, "the shaft turns at up to {speed:.0f} rpm in both directions, with up to {torque:.3g} A of current "
-         "that makes torque", _spin, 20.0, 165.0),
-    Step(drag.NAME, "the shaft is accelerated to {speed:.0f} rpm, runs down and is braked, with up to {torque:.3g} A",
-         _drag, 10.0, 25.0),
-    Step("resistance", "direct currents up to {level:.3g} A along the magnet for {level_s:.1f} s; no torque",
-         _resistance, 4.0),
+    Step(spin.NAME, "the shaft turns at {speed:.0f} rpm in both directions, for moments somewhat faster, with up to "
+         "{torque:.3g} A of current that makes torque; beyond {limit:.0f} rpm switching is disabled", _spin, 20.0,
+         165.0),
+    Step(drag.NAME, "the shaft is accelerated to {speed:.0f} rpm, or somewhat beyond, runs down and is braked, with up "
+         "to {torque:.3g} A; beyond {limit:.0f} rpm switching is disabled", _drag, 10.0, 25.0),
+    Step("resistance", "direct currents up to {level:.3g} A along the magnet for {level_s:.1f} s, more where they are "
+         "repeated: no torque but by an error of the angle, which turns a light rotor; beyond {angle:.0f} electrical "
+         "degrees a current ends", _resistance, 4.0),
     Step("map", "voltage pulses with currents up to {reach:.3g} A; alternating torque: the rotor swings; beyond "
          "{angle:.0f} electrical degrees a burst ends", _map, 4.0),
 )  # fmt: skip
@@ -207,6 +211,7 @@ def announcement(step: Step, known: Nameplate) -> str:
     return step.does.format(reach=known.i_max_A, level=levels.LEVELS[-1] * known.i_max_A, level_s=levels.duration_s(),
                             angle=known.swing_deg, vector=connection.SHARES[-1] * known.i_max_A, turns=connection.TURNS,
                             speed=turning.SPEED_SHARE * known.speed_max_rpm,
+                            limit=turning.LIMIT_SHARE * known.speed_max_rpm,
                             torque=spin.Q_SHARES[-1] * known.i_max_A)  # fmt: skip
 
 

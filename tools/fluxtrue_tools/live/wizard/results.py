@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from fluxtrue_tools.commission import connection, plan
+from fluxtrue_tools.commission.drag import coupled, inertia_text
 from fluxtrue_tools.commission.harmonics import LARGE_RAD, Harmonics
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.steps import Found
@@ -15,7 +16,7 @@ TITLES: Final = {"offsets": "Current sensors at rest", "phases": "Leads, angle s
                  "spin": "Angle offset and magnet", "drag": "Inertia and drag",
                  "resistance": "Resistance and inverter", "map": "Flux map"}  # fmt: skip
 # What tests/commission requires of hidden machines.
-OFFSET_SHARE, R_SHARE, MAP_SHARE, GAIN_SHARE = 0.001, 0.01, 0.01, 0.002
+OFFSET_SHARE, R_SHARE, MAP_SHARE, GAIN_SHARE, L_SHARE = 0.001, 0.01, 0.01, 0.002, 0.2
 ANGLE_DEG, HARMONIC_DEG, PSI_SHARE, INERTIA_SHARE, DRAG_SHARE = 0.2, 0.2, 0.005, 0.03, 0.1
 
 Row = tuple[str, str, str, str]  # what, found, ±, bound
@@ -79,14 +80,18 @@ def _spin(found: Found, known: Nameplate, _: float) -> list[Row]:
     ]  # fmt: skip
 
 
-def _drag(found: Found, _: Nameplate, __: float) -> list[Row]:
+def _drag(found: Found, known: Nameplate, _: float) -> list[Row]:
     assert found.drag is not None
     drag = found.drag
-    rows = [("Inertia", f"{drag.inertia_kgm2:.4g} kg·m²", f"{drag.inertia_sigma_kgm2:.1g} kg·m²",
-             f"± at most {INERTIA_SHARE * drag.inertia_kgm2:.2g} kg·m²")]  # fmt: skip
-    for speed in (0.4 * drag.to_rad_s, drag.to_rad_s):
-        torque_Nm = float(drag.torque_Nm(np.array(speed)))
-        rows.append((f"Drag at {30.0 / math.pi * speed:.0f} rpm", f"{torque_Nm:.3g} N·m", "",
+    inertia, sigma, bound = (inertia_text(each, digits, drag.inertia_kgm2)
+                             for each, digits in ((drag.inertia_kgm2, 4), (drag.inertia_sigma_kgm2, 1),
+                                                  (INERTIA_SHARE * drag.inertia_kgm2, 2)))  # fmt: skip
+    rows = [("Inertia", inertia, sigma, f"± at most {bound}"),
+            ("Guess for a rotor of this nameplate", inertia_text(known.inertia_kgm2, 2), "", "")]  # fmt: skip
+    if warned := coupled(drag, known):
+        rows.append(("Check that the shaft is free", warned, "", ""))
+    for speed, torque_Nm, sigma_Nm in drag.shown():
+        rows.append((f"Drag at {30.0 / math.pi * speed:.0f} rpm", f"{torque_Nm:.3g} N·m", f"{sigma_Nm:.1g} N·m",
                      f"± at most {DRAG_SHARE * torque_Nm:.1g} N·m"))  # fmt: skip
     return rows + (_harmonics(found.spun.harmonics) if found.spun is not None else [])
 
@@ -94,14 +99,15 @@ def _drag(found: Found, _: Nameplate, __: float) -> list[Row]:
 def _resistance(found: Found, known: Nameplate, _: float) -> list[Row]:
     r, first = found.resistance, found.first
     assert r is not None and first is not None
+    l_d_H, l_q_H = first.found_H
     rows = [
         ("Resistance, beyond the sensors' gains", f"{1e3 * r.r_ohm:.4g} mΩ", f"{1e3 * r.r_sigma_ohm:.1g} mΩ",
          f"± at most {1e3 * R_SHARE * r.r_ohm:.2g} mΩ"),
         ("Guess of the nameplate", f"{1e3 * known.r_ohm:.4g} mΩ", "", ""),
         ("Voltage that a leg of the inverter loses", f"{r.total_V:.3g} V", "", ""),
         ("of which the nameplate did not know", f"{r.level_V:+.3g} V", "", ""),
-        ("L_d at small currents", f"{1e3 * first.l_d_H:.4g} mH", "", ""),
-        ("L_q at small currents", f"{1e3 * first.l_q_H:.4g} mH", "", ""),
+        ("L_d at small currents", f"{1e3 * l_d_H:.3g} mH", "", f"± at most {100.0 * L_SHARE:.0f} %"),
+        ("L_q at small currents", f"{1e3 * l_q_H:.3g} mH", "", f"± at most {100.0 * L_SHARE:.0f} %"),
     ]  # fmt: skip
     return rows + _gains(found)
 
