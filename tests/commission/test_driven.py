@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from fluxtrue_tools.commission import driven, hidden, proof
+from fluxtrue_tools.commission import campaign, driven, hidden, proof
 from fluxtrue_tools.commission.driven import NAMEPLATE, TABLES
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.turning import Connection
@@ -109,3 +109,11 @@ def test_results_say_what_was_missed(tmp_path: Path) -> None:
                  "leaf       2  refused: no", "0 of 1 machines keep"):  # fmt: skip
         assert said in text
     assert (tmp_path / "report.txt").read_text(encoding="utf-8") == text
+
+
+def test_a_summary_counts_the_machines_that_keep_a_bound() -> None:
+    """With other errors the bounds of the results are twice as large, not those of current, speed and movement."""
+    values = np.array([0.5, -0.9, 1.5])
+    assert "worst 1.5; bound 1, kept by 2" in campaign.summary(campaign.MOVEMENT, values, 2.0)
+    assert "worst 1.5; bound 2, kept by 3" in campaign.summary("R, %", values, 2.0)
+    assert campaign.summary("R, %", values, 1.0).endswith("bound 1, kept by 2")
