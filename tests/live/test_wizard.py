@@ -6,6 +6,7 @@ One page serves all tests of this file, in their order. Simulated time waits for
 
 import io
 import os
+import re
 import socket
 import tomllib
 import urllib.request
@@ -57,6 +58,8 @@ FOUND = "accept or repeat"
 BATCHES = 36  # six times all that can arrive during a step
 ARRIVALS = Path(__file__).with_name("arrivals_wizard.js").read_text()
 OFF_S = 0.2
+CAPTION = ROOT / "docs" / "howto" / "commission.md"  # of docs/images/wizard.png
+BURSTS_DIFFER, MOVED_DIFFER_DEG = 2, 0.5
 
 
 @dataclass
@@ -357,6 +360,16 @@ def test_the_resistance_is_found_with_its_bound(bench: Bench) -> None:
     bench.wait("map", "next")
 
 
+def the_picture_in_the_documentation_is_of_this_code(rows: dict[str, list[str]]) -> None:
+    """Its caption has the numbers that it shows. Those of two measurements differ by their noise."""
+    told = re.search(r"saturated 12.*; (\d+) bursts, .* by up to ([\d.]+)°", CAPTION.read_text(encoding="utf-8"))
+    assert told is not None
+    bursts = int(rows["Bursts that ended early"][0].split(" of ")[1])
+    moved_deg = float(rows["Movement of the rotor, electrical"][0].removesuffix("°"))
+    is_of_this_code = abs(bursts - int(told[1])) <= BURSTS_DIFFER and abs(moved_deg - float(told[2])) <= MOVED_DIFFER_DEG
+    assert is_of_this_code, f"{bursts} bursts, {moved_deg}°: copy the new picture to docs/images, and correct {CAPTION}"
+
+
 def test_the_map_is_found_and_the_folder_is_written(bench: Bench) -> None:
     page = bench.page
     bench.press("map", "do")
@@ -365,6 +378,7 @@ def test_the_map_is_found_and_the_folder_is_written(bench: Bench) -> None:
     bench.wait("map", FOUND)
     print(f"map at {page.server.now_s():.0f} s simulated: {bench.rows('map')}")
     bench.shoot("map", "step-map")
+    the_picture_in_the_documentation_is_of_this_code(bench.rows("map"))
     assert page.text("finish-state") == "later"
     bench.press("map", "accept")
     polled(lambda: page.text("finish-state") == "finished")
@@ -407,7 +421,11 @@ def test_the_downloaded_folder_names_its_sources(folder: Path, bench: Bench) -> 
     assert reached.map_rms <= MAP_RMS
 
 
-def test_the_built_firmware_makes_40_newton_metres_true(folder: Path, bench: Bench, tmp_path: Path) -> None:
+def test_with_the_magnet_that_was_entered_the_built_firmware_makes_40_newton_metres_true(
+    folder: Path, bench: Bench, tmp_path: Path
+) -> None:
+    """The entered flux linkage is the true one: at standstill nothing shows it. So this tests resistance, map and folder;
+    test_wizard_turning.py drives with the flux linkage that the wizard has measured itself."""
     built = simulation_like(Path(os.environ["FLUXTRUE_BUILD_DIR"]), "unknown", folder, tmp_path / "built")
     motor = motors.read(MotorFolder("my-motor", built))
     errors = {}
