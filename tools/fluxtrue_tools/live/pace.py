@@ -39,26 +39,31 @@ class Pace(Protocol):
 
 
 class WallClock:
-    """The time of a bench: the wall clock."""
+    """The time of a bench: the wall clock.
 
-    def __init__(self, bus: can.BusABC, listeners: list[Listener]) -> None:
-        self._bus = bus
+    clock, wait   what tells the time, and waits at most so long for an event; a test brings its own
+    """
+
+    def __init__(self, bus: can.BusABC, listeners: list[Listener], clock: Callable[[], float] = time.monotonic,
+                 wait: Callable[[threading.Event, float], object] = threading.Event.wait) -> None:  # fmt: skip
+        self._bus, self._clock, self._wait = bus, clock, wait
         self._notifier = can.Notifier(bus, listeners, timeout=0.1)
-        self._due_s = time.monotonic()
+        self._due_s = clock()
 
     @property
     def now_s(self) -> float:
         """The time of commands and of the reports of the pages."""
-        return time.monotonic()
+        return self._clock()
 
     def send(self, frame: can.Message) -> None:
         """One command."""
         self._bus.send(frame, timeout=PERIOD_S)
 
     def next_period(self, stop: threading.Event) -> None:
-        """Wait until the next command is due."""
-        self._due_s = max(self._due_s + PERIOD_S, time.monotonic() - PERIOD_S)
-        stop.wait(max(self._due_s - time.monotonic(), 0.0))
+        """Wait until the next command is due. After a stall it is due at once, and of the periods that were missed at
+        most two are made up for."""
+        self._due_s = max(self._due_s + PERIOD_S, self._clock() - PERIOD_S)
+        self._wait(stop, max(self._due_s - self._clock(), 0.0))
 
     @contextmanager
     def standing_still(self) -> Iterator[None]:
