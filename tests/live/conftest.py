@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page's server as a child process, a browser that shows the page, and simulated time that waits for both.
 
-Each test has its own virtual ECU. Its time advances when the server asks for it, and the server waits until every page
-has drawn the previous values (--in-step). However long a browser takes, no command is late and no page is silent.
+The time of a virtual ECU advances when the server asks for it, and the server waits until every page has drawn the
+previous values (--in-step). However long a browser takes, no command is late and no page is silent.
+
+The tests of a file share a server and its virtual ECU until one of them fails: to start them takes seconds. A page that
+a test is given has been loaded anew, without control, faults or torque. A test that ends the server has one of its own.
 """
 
 import contextlib
@@ -25,6 +28,9 @@ from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 
 ROOT = Path(__file__).resolve().parents[2]
+FAILED = pytest.StashKey[bool]()
+AT_REST, FAULTED = ("standby", "ready", "discharge"), ("fault", "safe state")
+INVERTER_C = 40.0  # of a virtual ECU that has just been started
 CHROMIUM, DRIVER = Path("/usr/bin/chromium"), Path("/usr/bin/chromedriver")
 
 
@@ -71,9 +77,53 @@ def end(server: Server) -> None:
     assert server.process.wait(HANG_S) == 0
 
 
+class Shared:
+    """The server of a file's tests."""
+
+    def __init__(self, program: Path, place: Callable[[], Path]) -> None:
+        self._program, self._place = program, place
+        self._stack = contextlib.ExitStack()
+        self._server: Server | None = None
+
+    def server(self) -> Server:
+        """The present one, or a new one."""
+        if self._server is None:
+            self._server = self._stack.enter_context(contextlib.contextmanager(connected)(self._program, self._place()))
+        return self._server
+
+    def close(self) -> None:
+        """The next test gets a new one."""
+        self._server = None
+        self._stack.close()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Iterator[None]:
+    """A test that has failed may have left anything: the next one begins with a new server."""
+    report = yield
+    if report.failed:  # type: ignore[attr-defined]
+        item.stash[FAILED] = True
+    return report
+
+
+@pytest.fixture(scope="module")
+def shared(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared]:
+    made = Shared(Path(request.config.getoption("--vecu")), lambda: tmp_path_factory.mktemp("live"))
+    yield made
+    made.close()
+
+
 @pytest.fixture
-def server(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Server]:
-    """A server connected to a virtual ECU that has just been started."""
+def server(request: pytest.FixtureRequest, shared: Shared) -> Iterator[Server]:
+    """A server connected to a virtual ECU, in the state in which the test before has left it."""
+    yield shared.server()
+    if request.node.stash.get(FAILED, False):
+        shared.close()
+
+
+@pytest.fixture
+def own_server(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Server]:
+    """A server that the test may end, connected to a virtual ECU that has just been started."""
     yield from connected(Path(request.config.getoption("--vecu")), tmp_path)
 
 
@@ -138,15 +188,47 @@ def browser() -> Iterator[webdriver.Chrome]:
 
 @pytest.fixture
 def page(browser: webdriver.Chrome, server: Server) -> Page:
-    """A page whose drive runs at 2000 rpm."""
-    opened = Page(browser, server)
+    """A page whose drive runs at 2000 rpm, without torque."""
+    return running(browser, server)
+
+
+@pytest.fixture
+def own_page(browser: webdriver.Chrome, own_server: Server) -> Page:
+    """The same with a server that the test may end."""
+    return running(browser, own_server)
+
+
+def opened(browser: webdriver.Chrome, server: Server) -> Page:
+    """A page that has been loaded anew, the only one, on an inverter without torque; faults are reset."""
+    for other in browser.window_handles[:-1]:
+        browser.switch_to.window(other)
+        browser.close()
+    browser.switch_to.window(browser.window_handles[0])
+    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
     browser.get("about:blank")
-    browser.get_log("browser")  # discards the messages of the previous page, whose server has ended
+    browser.get_log("browser")  # discards the messages of the previous page, whose server may have ended
+    assert server.stand is not None
+    server.stand.set(board_gate_fault=0, board_inverter_C=INVERTER_C)
+    page = Page(browser, server)
     browser.get(server.url)
-    opened.until(lambda: opened.text("state") == "standby", "standby")
-    opened.find("ready").click()
-    opened.until(lambda: opened.text("state") == "ready", "ready")
-    opened.enable()
-    opened.slide("speed_rpm", 2000.0)
-    opened.until(lambda: opened.newest("INV_Status", "Speed") > 1990.0, "2000 rpm")
-    return opened
+    page.until(lambda: page.text("state") in (*AT_REST, *FAULTED), "an end of the drive before")
+    if page.text("state") in FAULTED:
+        page.slide("speed_rpm", 0.0)
+        page.until(lambda: page.find("reset").is_enabled(), "the reset")
+        page.press("reset")
+        page.until(lambda: page.text("state") in AT_REST and page.text("faults") == "none", "no fault")
+        page.run("window.scrollTo(0, 0)")
+    return page
+
+
+def running(browser: webdriver.Chrome, server: Server) -> Page:
+    """The same, enabled, with the test stand in its usual state."""
+    page = opened(browser, server)
+    if page.text("state") != "ready":
+        page.find("ready").click()
+    page.until(lambda: page.text("state") == "ready", "ready")
+    page.enable()
+    for name, value in (("magnet_percent", 100.0), ("winding_C", 20.0), ("speed_rpm", 2000.0)):
+        page.slide(name, value)
+    page.until(lambda: abs(page.newest("INV_Status", "Speed") - 2000.0) < 10.0, "2000 rpm")
+    return page

@@ -4,7 +4,7 @@
 import asyncio
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
@@ -23,8 +23,9 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live import xcp
 from fluxtrue_tools.live.oscilloscope import Oscilloscope, content
 from fluxtrue_tools.live.session import Session
-from fluxtrue_tools.scope.scope import STATES, Capture, Setup, Status
+from fluxtrue_tools.scope.scope import BUSY, STATES, USER, Capture, Setup, Status
 from fluxtrue_tools.scope.spectrum import spectrum_of
+from fluxtrue_tools.scope.xcp import XcpRefused
 
 CURRENT = Base("CURRENT", "A", 400.0)
 DESCRIPTION = Description(
@@ -153,7 +154,12 @@ class Ecu:
     def take(self, setup: Setup) -> None:
         assert setup is SETUP
 
+    def stop(self) -> None:
+        self.state = "idle"
+
     def arm(self) -> None:
+        if self.state != "idle":
+            raise FluxtrueError("in use") from XcpRefused(USER, BUSY)
         self.armed, self.state = self.armed + 1, "armed"
 
     def progress(self) -> Status:
@@ -164,8 +170,8 @@ class Ecu:
     def status(self) -> Status:
         return Status(self.state, self.is_freeze_frame, 1, (0,), "manual", 0, 0, 1, 64, 16, 0, 16, 64, 0, 0)
 
-    def read(self) -> Capture:
-        self.state = "idle"
+    def read(self, release: bool) -> Capture:
+        self.state = "idle" if release else self.state
         return replace(captured(), is_freeze_frame=self.is_freeze_frame)
 
 
@@ -204,6 +210,62 @@ def test_a_fault_that_comes_first_leaves_its_freeze_frame_and_ends_the_repetitio
     assert scope.newest is not None and scope.newest[1].is_freeze_frame
     assert (scope.status.state, ecu.armed) == ("idle", 1)
     assert scope.status.text == "A fault came first: these are the periods around it."
+
+
+def kept(scope: Oscilloscope) -> None:
+    scope.read_kept()
+
+
+def armed(scope: Oscilloscope) -> None:
+    with pytest.raises(FluxtrueError, match="^Nothing was armed: "):
+        scope.arm(SETUP, True)
+
+
+@pytest.mark.parametrize("ask", [kept, armed])
+@pytest.mark.parametrize(("is_freeze_frame", "what"), [(True, "A fault has left"), (False, "Another tool has left")])
+def test_what_was_not_armed_here_is_read_and_stays_in_the_inverter_until_it_is_ended(
+    scope: Oscilloscope, ecu: Ecu, ask: Callable[[Oscilloscope], None], is_freeze_frame: bool, what: str
+) -> None:
+    ecu.is_freeze_frame, ecu.state = is_freeze_frame, "done"
+    ask(scope)
+    assert scope.newest is not None and scope.newest[0] == 1
+    assert scope.newest[1].is_freeze_frame == is_freeze_frame
+    assert (scope.status.state, scope.status.capture, ecu.state) == ("idle", 1, "done")
+    assert what in scope.status.text and not scope.repeats
+    scope.end()
+    scope.arm(SETUP, False)
+    assert (scope.status.state, scope.status.text, ecu.armed) == ("armed", "", 1)
+
+
+@pytest.mark.parametrize(("state", "why"), [("idle", "keeps no capture"), ("armed", "another tool is capturing"),
+                                            ("triggered", "another tool is capturing")])  # fmt: skip
+def test_without_a_complete_capture_nothing_is_read(scope: Oscilloscope, ecu: Ecu, state: str, why: str) -> None:
+    ecu.state = state
+    with pytest.raises(FluxtrueError, match=why):
+        scope.read_kept()
+    if state != "idle":
+        with pytest.raises(FluxtrueError, match=f"Nothing was armed: {why}"):
+            scope.arm(SETUP, False)
+    assert scope.newest is None and scope.status.state == "idle"
+
+
+def test_a_capture_that_waits_for_its_trigger_is_not_read_before(scope: Oscilloscope, ecu: Ecu) -> None:
+    scope.arm(SETUP, False)
+    scope.read_kept()
+    assert (scope.status.state, scope.newest) == ("armed", None)
+
+
+def test_a_kept_capture_that_cannot_be_read_leaves_an_oscilloscope_that_can_be_armed(
+    scope: Oscilloscope, ecu: Ecu, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def read(_: bool) -> Capture:
+        raise FluxtrueError("another checksum")
+
+    monkeypatch.setattr(ecu, "read", read)
+    ecu.state = "done"
+    with pytest.raises(FluxtrueError, match="another checksum"):
+        scope.read_kept()
+    assert (scope.status.state, scope.newest) == ("idle", None)
 
 
 def test_a_capture_that_another_tool_has_ended_is_told(scope: Oscilloscope, ecu: Ecu) -> None:

@@ -5,7 +5,9 @@ import json
 import urllib.error
 import urllib.request
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 from asammdf import MDF
@@ -21,7 +23,9 @@ from fluxtrue_tools.log.decode import signals_of
 
 HAND_TIMEOUT_S = 0.3  # docs/howto/live.md
 STOP_S = 0.08
+OFF_S = 0.15  # after Stop, Off, or the end of the page with control
 BATCH_S = 0.04
+INVERTER_C = 92.5  # half the torque is left
 
 
 def test_the_page_names_the_check_that_the_motor_data_failed(browser: webdriver.Chrome, refused: Server) -> None:
@@ -36,19 +40,50 @@ def test_the_page_names_the_check_that_the_motor_data_failed(browser: webdriver.
     assert lines[5].startswith("Correct the motor data")
 
 
+SOLID = """return ['torque', 'currents'].flatMap((name) => {
+    const figure = document.getElementById(`chart-${name}`), canvas = figure.querySelector('canvas');
+    const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+    return [...figure.querySelectorAll('.legend .solid i')].map((mark) => {
+        const color = getComputedStyle(mark).borderTopColor.match(/[0-9]+/g).map(Number);
+        let count = 0;
+        for (let k = 0; k < data.length; k += 4) count += color.every((one, j) => data[k + j] === one);
+        return count;
+    });
+});"""  # pixels of a chart in the colour of each solid line's legend
+
+
+def drawn_again(page: Page) -> None:
+    """Every chart has been drawn since."""
+    before = page.run("return fluxtrue.stats.draws")
+    assert isinstance(before, int)
+    page.until(lambda: page.run("return fluxtrue.stats.draws") > before + 2, "charts")  # type: ignore[operator]
+
+
+def shoot(page: Page, pictures: Path, name: str) -> None:
+    """Screenshots of both sizes and themes; on each of them the page is no wider than the screen."""
+    pictures.mkdir(parents=True, exist_ok=True)
+    for width, height in ((1440, 900), (390, 844)):
+        for theme in ("light", "dark"):
+            page.size(width, height, theme)
+            drawn_again(page)
+            root = "document.documentElement"
+            assert page.run(f"return {root}.scrollWidth <= {root}.clientWidth"), f"it fits {width} px"
+            pixels = page.run(SOLID)
+            assert isinstance(pixels, list) and len(pixels) == 3, "estimated torque, i_d, i_q"
+            assert min(pixels) > 50, f"lines in the colours of their legends, {width} px, {theme}: {pixels}"
+            assert page.browser.save_screenshot(str(pictures / f"{name}-{width}-{theme}.png"))
+    page.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
 def test_the_slider_moves_the_torque_and_the_magnet_does_not(page: Page, request: pytest.FixtureRequest) -> None:
     page.drive(60.0)
     page.slide("magnet_percent", 88.0)
     weakened_s = page.server.now_s()
-    # The screenshot shows the identified flux and the restored torque.
-    page.size(1440, 900, "light")
+    # The screenshots show the identified flux and the restored torque.
     page.until(lambda: page.server.now_s() > weakened_s + 8.0, "8 s")
     page.until(lambda: abs(page.newest("truth", "Torque") - 60.0) < 1.5, "60 N·m at the shaft")
-    pictures = Path(request.config.getoption("--pictures"))
-    pictures.mkdir(parents=True, exist_ok=True)
     page.run("window.scrollTo(0, 0)")
-    assert page.browser.save_screenshot(str(pictures / "live.png"))
-    page.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    shoot(page, Path(request.config.getoption("--pictures")), "live")
     assert not [entry for entry in page.browser.get_log("browser") if entry["level"] == "SEVERE"]
 
 
@@ -72,13 +107,63 @@ def test_every_batch_that_arrives_is_drawn(page: Page) -> None:
     assert page.server.now_s() - begin_s >= (batches - 2) * BATCH_S - 1e-6
 
 
-def test_closing_the_page_ramps_the_torque_to_zero_and_ends_the_switching(page: Page) -> None:
-    page.drive(40.0)
-    page.browser.get("about:blank")
+def noted(page: Page, element: str, event: str) -> None:
+    """When the event comes, the page keeps the time of the newest value that it has received."""
+    page.run(f"{element}.addEventListener('{event}', () => "
+             "localStorage.setItem('ended_s', fluxtrue.rings.INV_Status.data[0].at(-1)), {capture: true, once: true});"
+             "localStorage.removeItem('ended_s')")  # fmt: skip
+
+
+def is_without_torque_in_time(page: Page, how: str) -> None:
+    """From OFF_S after the event that was noted there is no torque, neither estimated nor at the shaft.
+
+    The event acts up to one batch, 0.04 s, after the newest value that the page had: the measured time is longer.
+    """
+    ended_s = page.run("return Number(localStorage.getItem('ended_s'))")
+    assert isinstance(ended_s, int | float) and ended_s > 0.0, how
+    page.until(lambda: page.newest_s() > ended_s + 2.0 * OFF_S, f"{how}: time passes")
+    for ring, name in (("INV_Status", "TorqueEstimated"), ("truth", "Torque")):
+        drawn = page.drawn(ring, name)
+        assert max(torque for t, torque in drawn if t > ended_s) > 20.0, f"{how}: there was torque, {name}"
+        late = [(t - ended_s, torque) for t, torque in drawn if t > ended_s + OFF_S and abs(torque) > 0.5]
+        assert not late, f"{how}, {name}: {late}"
+
+
+def again(page: Page) -> None:
+    """Drive at most of the machine's torque, after any end."""
+    page.until(lambda: page.find("ready").is_enabled() or page.find("enable").is_enabled(), "a state to go on from")
+    if page.find("ready").is_enabled():
+        page.find("ready").click()
+        page.until(lambda: page.text("state") == "ready", "ready")
+    page.enable()
+    page.drive(125.0)
+
+
+def test_off_a_page_that_goes_elsewhere_and_a_closed_tab_end_the_torque_within_150_ms(page: Page) -> None:
+    page.drive(125.0)
+    noted(page, "document.getElementById('off')", "click")
+    page.find("off").click()
+    is_without_torque_in_time(page, "Off")
+    again(page)
+    noted(page, "window", "pagehide")
+    page.browser.get("about:blank")  # no page is left: simulated time stands until the next one comes
     page.browser.get(page.server.url)
     page.until(lambda: page.text("state") == "ready", "ready again")
-    assert abs(page.newest("INV_Status", "TorqueCommanded")) < 0.1
-    assert not page.find("torque").is_enabled()
+    is_without_torque_in_time(page, "another address")
+    assert not page.find("torque").is_enabled() and "closed or silent" in page.text("stopped")
+    again(page)
+    first = page.browser.current_window_handle
+    page.browser.switch_to.new_window("window")
+    page.browser.get(page.server.url)
+    page.until(lambda: page.text("control") == "control elsewhere", "a second page")
+    second = page.browser.current_window_handle
+    page.browser.switch_to.window(first)
+    page.until(lambda: page.newest("truth", "Torque") > 120.0, "torque")
+    noted(page, "window", "pagehide")
+    page.browser.close()
+    page.browser.switch_to.window(second)
+    is_without_torque_in_time(page, "a closed tab")
+    page.until(lambda: page.text("state") == "ready" and page.text("control") == "control free", "ready")
     assert "closed or silent" in page.text("stopped")
 
 
@@ -101,15 +186,34 @@ def test_a_silent_page_loses_its_torque_after_300_ms_and_one_press_on_enable_con
 
 def test_after_a_gap_in_the_commands_the_page_gives_the_reason_and_one_press_on_enable_continues(page: Page) -> None:
     page.drive(60.0)
-    assert page.server.stand is not None
+    assert page.text("reasons") == "" and page.server.stand is not None
     page.server.stand.run(60.0)  # time passes without a command
     page.until(lambda: page.text("stopped") != "", "the reason")
     assert "command timed out" in page.text("stopped") and "No command for 70 ms" in page.text("stopped")
     page.until(lambda: page.text("state") == "ready", "ready")
     assert not page.find("torque").is_enabled() and page.text("torque-value") == "0.0"
+    page.until(lambda: page.text("reasons") != "", "why it was refused")
+    assert page.text("reasons").splitlines() == [
+        "Refused: command timed out", "The command was lost while the drive was enabled.",
+        "Check the bus and the load of this computer, then press Enable.",
+    ]  # fmt: skip
     page.enable()
     assert page.text("stopped") == ""
+    page.until(lambda: page.text("reasons") == "", "nothing is refused any more")
     page.drive(20.0)
+
+
+def test_a_derated_torque_is_explained_with_what_to_do_until_its_cause_is_gone(page: Page) -> None:
+    page.drive(125.0)
+    assert page.text("reasons") == "" and page.server.stand is not None
+    page.server.stand.set(board_inverter_C=INVERTER_C)
+    page.until(lambda: page.text("reasons").startswith("Derated: inverter temperature"), "why it is derated")
+    page.until(lambda: page.text("state") == "derate", "state derate")
+    assert page.text("reasons").splitlines()[1:3] == [
+        "The inverter is too warm.", "Let the inverter cool down, or improve its cooling.",
+    ]  # fmt: skip
+    page.server.stand.set(board_inverter_C=40.0)
+    page.until(lambda: page.text("state") == "run" and page.text("reasons") == "", "nothing is derated any more")
 
 
 def test_a_second_page_shows_values_but_cannot_command(page: Page) -> None:
@@ -124,6 +228,12 @@ def test_a_second_page_shows_values_but_cannot_command(page: Page) -> None:
     page.browser.switch_to.window(first)
 
 
+def restore(page: Page) -> None:
+    """The parameters of the build, for the next test."""
+    page.press("tune-restore")
+    page.until(lambda: page.text("tune-text") == "All values are those of the build.", "the defaults")
+
+
 def test_calibration_values_are_read_written_and_refused(page: Page) -> None:
     page.find("tune-read").click()
     page.until(lambda: len(page.browser.find_elements(By.CSS_SELECTOR, "#tuning tbody tr")) >= 6, "the values")
@@ -134,6 +244,7 @@ def test_calibration_values_are_read_written_and_refused(page: Page) -> None:
     page.run(script, 9)
     page.until(lambda: "refused by the ECU" in page.text("message"), "a refusal")
     assert "allowed: 2 … 4" in page.text("message")
+    restore(page)
 
 
 def test_an_answer_leaves_the_field_in_which_the_next_value_is_entered(page: Page) -> None:
@@ -147,6 +258,7 @@ def test_an_answer_leaves_the_field_in_which_the_next_value_is_entered(page: Pag
     page.until(lambda: page.text("message") == "Written: observer_m = 3.5", "the answer")
     name, text = page.run("return [document.activeElement.name, document.activeElement.value]")  # type: ignore[misc]
     assert name not in (None, "", "observer_m") and text == "12"
+    restore(page)
 
 
 def test_off_discharges_the_dc_link_also_in_a_fault(page: Page) -> None:
@@ -158,7 +270,10 @@ def test_off_discharges_the_dc_link_also_in_a_fault(page: Page) -> None:
     page.until(lambda: page.text("state") == "discharge", "discharge")
 
 
-def test_at_the_end_of_the_virtual_ecu_the_page_gives_the_reason_and_the_recording_can_be_written(page: Page) -> None:
+def test_at_the_end_of_the_virtual_ecu_the_page_gives_the_reason_and_the_recording_can_be_written(
+    own_page: Page,
+) -> None:
+    page = own_page
     assert isinstance(page.server, Server) and page.server.ecu is not None
     page.find("record").click()
     page.until(lambda: page.text("record") == "Stop recording", "recording")
@@ -172,14 +287,28 @@ def test_at_the_end_of_the_virtual_ecu_the_page_gives_the_reason_and_the_recordi
     polled(lambda: page.enabled() == {"theme"})
 
 
+def fits_a_phone(page: Page) -> None:
+    """Nothing is wider than the screen, and the header's buttons lie in one line, whole."""
+    assert page.run("return document.documentElement.scrollWidth") == 390
+    places: Any = page.run("return [...document.querySelectorAll('h1, .actions button')].map((one) => "
+                           "[one.getBoundingClientRect().x, one.getBoundingClientRect().right,"
+                           " one.scrollWidth <= one.clientWidth, one.textContent]);")  # fmt: skip
+    assert len(places) == 5 and all(is_whole for _, _, is_whole, _ in places), places
+    assert all(right <= after for (_, right, _, _), (after, _, _, _) in pairwise([*places, (390, 0, 0, "")])), places
+
+
 def test_a_recording_is_an_mdf4_file_and_can_be_played_back(page: Page, replay: Callable[[Path], Server]) -> None:
     page.find("record").click()
     page.until(lambda: page.text("record") == "Stop recording", "recording")
     page.drive(30.0)
     driven_s = page.server.now_s()
     page.until(lambda: page.server.now_s() > driven_s + 2.0, "2 s")
+    page.size(390, 844, "light")
+    fits_a_phone(page)
     page.find("record").click()
     page.until(lambda: "Written" in page.text("file"), "the file")
+    fits_a_phone(page)
+    page.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
     (path,) = page.server.records.glob("*.mf4")
     with MDF(path) as log:
         assert log.get("CAN_DataFrame").samples.size > 500

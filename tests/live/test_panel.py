@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """What makes the page a control panel that can be trusted, in a browser."""
 
+import io
 import json
 import signal
+import urllib.request
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from conftest import Server, end
+from conftest import Server, end, opened
 from driver import Page
-from progress import polled, until
+from progress import HANG_S, polled, until
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 from fluxtrue_tools.live.words import TO_DO, words
+from fluxtrue_tools.scope.cli import FREEZE_FRAME
 
 ALWAYS = {"theme"}  # acts without a connection
 CHARTS = {"charts-pause", "charts-in", "charts-out", "charts-earlier", "charts-later"}  # change what is seen only
@@ -70,7 +74,8 @@ def test_a_page_without_control_changes_nothing_but_can_stop(page: Page) -> None
     page.until(lambda: "on another page" in page.text("stopped"), "the reason")
 
 
-def test_a_disconnected_page_shows_no_value_and_no_active_control(page: Page) -> None:
+def test_a_disconnected_page_shows_no_value_and_no_active_control(own_page: Page) -> None:
+    page = own_page
     page.drive(20.0)
     assert isinstance(page.server, Server)
     end(page.server)
@@ -156,22 +161,62 @@ def test_a_fault_is_explained_and_its_freeze_frame_drawn(page: Page) -> None:
     page.until(lambda: page.find("freeze-frame").is_displayed(), "the frame")
     assert len(page.browser.find_elements(By.CSS_SELECTOR, "#freeze-charts canvas")) == 5
     assert "in state run" in page.text("freeze-text")
+    the_freeze_frame_at_pwm_rate_is_drawn_exported_and_discarded(page)
+
+
+def the_freeze_frame_at_pwm_rate_is_drawn_exported_and_discarded(page: Page) -> None:
+    """Nothing was armed before the fault."""
+    page.until(lambda: page.text("scope-told").startswith("Freeze frame "), "the frame at PWM rate")
+    assert "A fault has left these periods" in page.text("scope-text")
+    with urllib.request.urlopen(page.server.url + "capture.csv", timeout=HANG_S) as answer:
+        table = np.genfromtxt(io.BytesIO(answer.read()), delimiter=",", names=True)
+    assert len(table) == 64 and table.dtype.names == ("time_s", *FREEZE_FRAME)
+    assert np.allclose(table["time_s"], 1e-4 * (np.arange(64) - 32)), "32 before the trigger, 32 from it on"
+    # Currents for 20 N·m until the fault, none soon after it.
+    assert table["i_q_A"][:32].min() > 10.0 and abs(table["i_q_A"][-8:]).max() < 5.0
+    units = {row.text.split()[0]: row.text.split()[-1]
+             for row in page.browser.find_elements(By.CSS_SELECTOR, "#scope-values tbody tr")}  # fmt: skip
+    assert {units[name] for name in FREEZE_FRAME} == {"A", "V", "rad/s", "°"}
+    assert units["omega_rad_s"] == "rad/s"
+    first, last = page.run("return fluxtrue.ranges().at(-1)")  # type: ignore[misc]
+    assert (first, last) == pytest.approx((-3.2, 3.1)), "the trigger is at 0"
+    assert page.find("scope-csv").is_enabled() and page.find("scope-mf4").is_enabled()
+    page.press("scope-arm")
+    page.until(lambda: page.text("scope-text").startswith("Nothing was armed: A fault has left"), "a refusal")
+    page.press("scope-end")
+    page.until(lambda: page.text("scope-text") == "The inverter holds no capture any more.", "the end")
+    page.press("scope-arm")
+    page.until(lambda: page.text("scope-text").startswith("Armed"), "armed")
+
+
+def in_sight(page: Page, *names: str) -> None:
+    """Whole on a phone's screen; and the page is no wider than the screen."""
+    for name in names:
+        x, right, y, bottom = page.run(
+            "const place = document.getElementById(arguments[0]).getBoundingClientRect();"
+            "return [place.x, place.right, place.y, place.bottom];",
+            name,
+        )  # type: ignore[misc]
+        assert x >= 0 and right <= 390 and y >= 0 and bottom <= 844, name
+    assert page.run("return document.documentElement.scrollWidth") == 390
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_phone_shows_torque_state_and_stop_without_scrolling(
+def test_a_phone_shows_torque_state_stop_and_off_without_scrolling(
     browser: webdriver.Chrome, server: Server, theme: str, request: pytest.FixtureRequest
 ) -> None:
-    page = Page(browser, server)
+    page = opened(browser, server)
     page.size(390, 844, theme)
-    browser.get(server.url)
-    page.until(lambda: page.text("state") == "standby", "standby")
-    for name in ("state", "stop", "torque-estimated", "torque-value", "torque", "enable"):
-        place = page.find(name).rect
-        assert place["y"] >= 0 and place["y"] + place["height"] <= 844, name
-        assert place["x"] >= 0 and place["x"] + place["width"] <= 390, name
-    assert page.run("return document.documentElement.scrollWidth") == 390
-    assert page.run("return document.documentElement.dataset.theme") == theme
+    page.until(lambda: page.run("return document.documentElement.dataset.theme") == theme, "the theme")
+    in_sight(page, "state", "stop", "off", "torque-estimated", "torque-value", "torque", "enable")
+    if page.text("state") != "ready":
+        page.find("ready").click()
+    page.until(lambda: page.text("state") == "ready", "ready")
+    page.run("window.scrollTo(0, document.documentElement.scrollHeight)")
+    assert page.run("return scrollY > innerHeight"), "the end of the page"
+    in_sight(page, "state", "stop", "off")
+    page.find("off").click()
+    page.until(lambda: page.text("state") in ("discharge", "standby"), "Off acts from there")
     sizes = page.run("return [...document.querySelectorAll('body *')].filter((e) => e.children.length === 0 &&"
                      "e.textContent.trim()).map((e) => [parseFloat(getComputedStyle(e).fontSize), e.id])")  # fmt: skip
     assert isinstance(sizes, list) and max(sizes)[1] == "torque-estimated"

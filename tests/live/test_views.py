@@ -32,6 +32,21 @@ FOCUSED = """const e = document.activeElement, style = getComputedStyle(e), plac
 return [e.id || e.name || e.ariaLabel, e.closest('.card, header, #charts')?.id || 'header', place.top, place.bottom,
         style.outlineStyle !== 'none' && parseFloat(style.outlineWidth) >= 2 && place.bottom <= innerHeight
         && (e.closest('header') || place.top >= document.querySelector('header').getBoundingClientRect().bottom)];"""
+CAPTION_PX = 18.2  # one line
+CHARTS = """return [...document.querySelectorAll('#charts figure')].map((figure) => {
+    const place = (what) => figure.querySelector(what).getBoundingClientRect();
+    const box = place('.plot'), canvas = place('canvas'), { bottom } = figure.getBoundingClientRect();
+    return [figure.id, place('figcaption').height, bottom - box.bottom,
+            [box.width - canvas.width, box.height - canvas.height], bottom];
+});"""
+THEME = "return document.documentElement.dataset.theme"
+MARKS = """const probe = document.body.appendChild(document.createElement('i'));
+const found = [...document.querySelectorAll('#charts .legend i')].map((mark, k) => {
+    probe.style.color = `var(--${arguments[0][k]})`;
+    return [getComputedStyle(mark).borderTopColor, getComputedStyle(probe).color];
+});
+probe.remove();
+return found;"""
 REACHED = """return [...document.querySelectorAll('button:enabled, input:enabled, select:enabled, [tabindex]')]
     .filter((e) => e.getClientRects().length && e.tabIndex >= 0).map((e) => e.id || e.name || e.ariaLabel);"""
 
@@ -79,6 +94,25 @@ def test_every_active_control_is_reached_by_tab_in_the_order_in_which_it_is_read
     assert not [name for name, _, _, _, seen in reached if not seen], "no focus that is seen"
     for (before, card, top, _, _), (after, other, _, bottom, _) in pairwise(reached):
         assert card != other or bottom > top, f"{after} stands above {before}"
+
+
+def test_the_charts_fill_the_first_screen_and_their_legends_have_the_colours_of_the_lines(view: Page) -> None:
+    view.size(1440, 900, "light")
+    view.run("window.scrollTo(0, 0)")
+    found = view.run(CHARTS)
+    assert isinstance(found, list) and len(found) == 5
+    for name, caption, below, missing, bottom in found:
+        assert caption < 1.6 * CAPTION_PX, f"{name}: no second line for a legend that shows nothing"
+        assert below < 12.0 and max(map(abs, missing)) < 1.0, f"{name}: the picture fills its figure"
+        assert bottom <= 900.0, f"{name}: seen without scrolling"
+    assert max(bottom for *_, bottom in found) > 880.0, "no empty band below the charts"
+    for theme in ("light", "dark"):
+        view.size(1440, 900, theme)
+        view.until(lambda theme=theme: view.run(THEME) == theme, theme)
+        marks = view.run(MARKS, ["quiet", "blue", "orange", "green", "green", "violet", "violet"])
+        assert isinstance(marks, list) and len(marks) == 7
+        assert not [mark for mark in marks if mark[0] != mark[1]], "as the lines of charts.js"
+    view.size(1440, 900, "light")
 
 
 def ranges(page: Page) -> list[list[float]]:

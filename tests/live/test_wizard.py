@@ -366,7 +366,9 @@ def the_picture_in_the_documentation_is_of_this_code(rows: dict[str, list[str]])
     assert told is not None
     bursts = int(rows["Bursts that ended early"][0].split(" of ")[1])
     moved_deg = float(rows["Movement of the rotor, electrical"][0].removesuffix("°"))
-    is_of_this_code = abs(bursts - int(told[1])) <= BURSTS_DIFFER and abs(moved_deg - float(told[2])) <= MOVED_DIFFER_DEG
+    is_of_this_code = (
+        abs(bursts - int(told[1])) <= BURSTS_DIFFER and abs(moved_deg - float(told[2])) <= MOVED_DIFFER_DEG
+    )
     assert is_of_this_code, f"{bursts} bursts, {moved_deg}°: copy the new picture to docs/images, and correct {CAPTION}"
 
 
@@ -424,7 +426,7 @@ def test_the_downloaded_folder_names_its_sources(folder: Path, bench: Bench) -> 
 def test_with_the_magnet_that_was_entered_the_built_firmware_makes_40_newton_metres_true(
     folder: Path, bench: Bench, tmp_path: Path
 ) -> None:
-    """The entered flux linkage is the true one: at standstill nothing shows it. So this tests resistance, map and folder;
+    """The entered flux linkage is the true one: at standstill nothing shows it. So this tests resistance, map, folder;
     test_wizard_turning.py drives with the flux linkage that the wizard has measured itself."""
     built = simulation_like(Path(os.environ["FLUXTRUE_BUILD_DIR"]), "unknown", folder, tmp_path / "built")
     motor = motors.read(MotorFolder("my-motor", built))

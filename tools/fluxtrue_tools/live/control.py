@@ -205,6 +205,8 @@ def _capture(session: Session, socket: web.WebSocketResponse, message: dict[str,
         case "scope_end":
             take(session, socket)
             return _scoped(scope, scope.end)
+        case "scope_kept":  # changes nothing in the inverter: any page may
+            return _scoped(scope, scope.read_kept)
         case _:
             return _newest(scope)
 
@@ -267,7 +269,7 @@ def obey(session: Session, socket: web.WebSocketResponse, message: dict[str, Any
             return _tune(session, socket, message)
         case "tune_list" | "freeze":
             return _read(session, message)
-        case "scope_arm" | "scope_trigger" | "scope_end" | "capture":
+        case "scope_arm" | "scope_trigger" | "scope_end" | "scope_kept" | "capture":
             return _capture(session, socket, message)
         case "record":
             if session.link is None:

@@ -22,8 +22,10 @@ from fluxtrue_tools.scope.xcp import XcpRefused
 POLL_S: Final = 0.1  # between two readings of the capture's state
 WAITING: Final = ("armed", "triggered")
 DIGITS: Final = 6  # of a sample; the converter has fewer
-HELD: Final = ("Nothing was armed: the inverter still holds a freeze frame or the capture of another tool. "
-               "Press End to discard it.")  # fmt: skip
+OTHER: Final = "another tool is capturing; End ends its capture."
+FIRST: Final = "A fault came first: these are the periods around it."
+KEPT: Final = {True: "A fault has left these periods around it. End discards them in the inverter.",
+               False: "Another tool has left this capture. End discards it in the inverter."}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -120,9 +122,38 @@ class Oscilloscope:
             self._scope.arm()
         except FluxtrueError as error:
             if isinstance(error.__cause__, XcpRefused):
-                raise FluxtrueError(HELD) from error
+                self._read_kept("Nothing was armed: ")
+                raise FluxtrueError(self.status.text) from error
             raise
         self.status = replace(self.status, state="armed", text="")
+
+    def read_kept(self) -> None:
+        """Read what the inverter keeps although it was not armed here: the freeze frame of a fault, or the capture of
+        another tool. It stays in the inverter until end(), so that every page may ask for it."""
+        if self.status.state in WAITING:
+            return  # follow() reads what a fault leaves
+        with self._xcp.reported():
+            self._read_kept()
+
+    def _read_kept(self, result: str = "") -> None:
+        """result: what becomes of the request in which the capture was found."""
+        kept = self._scope.status()
+        if kept.state == "idle":
+            raise FluxtrueError("The inverter keeps no capture.")
+        if kept.state != "done":
+            raise FluxtrueError(f"{result}{OTHER}")
+        self._take(result + KEPT[kept.is_freeze_frame], release=False)
+
+    def _take(self, text: str, release: bool) -> None:
+        """Read the complete capture, which every page then draws."""
+        self.status = replace(self.status, state="reading")
+        try:
+            capture = self._scope.read(release)
+        except Exception:
+            self.status = replace(self.status, state="idle")
+            raise
+        self.newest = (self.status.capture + 1, capture)
+        self.status = ScopeStatus("idle", self.newest[0], text)
 
     def trigger(self) -> None:
         """Trigger now."""
@@ -164,11 +195,7 @@ class Oscilloscope:
         if status.state != "done":
             self.status = replace(self.status, state=status.state)
             return
-        self.status = replace(self.status, state="reading")
-        capture = self._scope.read()
-        text = "A fault came first: these are the periods around it." if capture.is_freeze_frame else ""
-        self.newest = (self.status.capture + 1, capture)
-        self.status = ScopeStatus("idle", self.newest[0], text)
+        self._take(FIRST if status.is_freeze_frame else "", release=True)
         if self.repeats and self._setup is not None:
             self._arm(self._setup)
 

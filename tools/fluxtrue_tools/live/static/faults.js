@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Latched faults with explanation and advice, their reset, and the freeze frame of the first one.
+// Latched faults with explanation and advice, their reset, and the freeze frames of the first one: that of the 1 kHz
+// steps is drawn here, that of the PWM periods by the oscilloscope.
 import { send } from "./connection.js";
 import { frameIsPast, showFreezeFrame } from "./freeze.js";
 import { $, element } from "./page.js";
@@ -7,6 +8,8 @@ import { reason, wordsOf } from "./reasons.js";
 
 const SIGNALS = ["DriveFaults", "EcuFaults"];
 const CHECK = "INV_Configuration.MotorCheck";
+
+let hasScope = false; // the server can read the oscilloscope
 
 function bits(hello, signal, word) {
   return Object.entries(hello.words[`INV_Faults.${signal}`]).filter(([bit]) => Math.floor(word / 2 ** bit) % 2)
@@ -24,13 +27,17 @@ function active({ hello, last }) {
 
 export function startFaults() {
   $("reset").onclick = () => send({ type: "reset" });
-  $("freeze").onclick = () => send({ type: "freeze" });
+  $("freeze").onclick = () => {
+    send({ type: "freeze" });
+    if (hasScope) send({ type: "scope_kept" });
+  };
   $("freeze-close").onclick = () => showFreezeFrame(null, { frozen: false });
 }
 
 export function showFaults(view) {
   const { hello, live, mayAct, last, status } = view;
   const known = live && Boolean(last?.INV_Faults);
+  hasScope = Boolean(hello.scope);
   const found = known ? active(view) : [];
   const key = JSON.stringify([known, found]);
   if ($("faults").dataset.key !== key) {

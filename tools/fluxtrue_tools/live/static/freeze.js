@@ -35,6 +35,7 @@ export function showFreezeFrame(hello, message) {
   if (!message.frozen) return;
   const { time_ms: time, state } = message.values;
   $("freeze-text").textContent = `${(time / 1000).toFixed(3)} s after the start, in state `
-    + `${wordsOf(hello, "INV_Status.State", state)[0]}; the fault is at 0 ms`;
+    + `${wordsOf(hello, "INV_Status.State", state)[0]}; the fault is at 0 ms`
+    + (hello.scope ? "; the PWM periods around it: see the oscilloscope" : "");
   CHARTS.forEach((chart) => drawChart(message, chart));
 }
