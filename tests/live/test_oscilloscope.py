@@ -316,6 +316,8 @@ def test_only_the_page_with_control_arms_and_every_page_gets_the_capture(
         for kind in ("scope_arm", "scope_trigger", "scope_end"):
             assert (await answer(second, WANTED | {"type": kind}))["text"] == "another page has control"
         assert ecu.armed == 0
+        kept = await answer(second, {"type": "scope_kept"})
+        assert kept["text"] == "The inverter keeps no capture.", "to look for one changes nothing: any page may"
         scope.arm(SETUP, False)
         ecu.state = "done"
         await asyncio.to_thread(scope.follow)
