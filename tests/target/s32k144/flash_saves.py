@@ -7,14 +7,16 @@ import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from ctypes import sizeof
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from fluxtrue_tools.emulate.build import Parts
 from fluxtrue_tools.emulate.core import Core
 from fluxtrue_tools.sim.library import Loop
+from fluxtrue_tools.sim.members import members
 
 RPM: Final = 2 * np.pi / 60
 FLASH, FLASH_BYTES, SLOT_BYTES, SECTOR_BYTES = 0x1000_0000, 0x1_0000, 512, 2048
@@ -22,6 +24,8 @@ SLOTS: Final = FLASH_BYTES // SLOT_BYTES
 HEADER: Final = struct.Struct("<4I")  # layout, size, sequence, CRC: firmware/storage/slot.h
 STATES: Final = 7  # of the filter
 RECORD: Final = struct.Struct(f"<I{STATES}i{STATES}i4i")  # firmware/storage/memory.c
+ADDED_VARIANCE_SHIFT: Final = (0, 3, 2, 8, 8, 8, 6)  # (ID-19): firmware/control/identify/record.c
+ONE_Q30: Final = 1 << 30
 CCIF: Final = 0x80
 FAILED_SECTORS: Final = 3  # word of memory_t, firmware/storage/memory.h
 RECALLED: Final = 28  # byte of it
@@ -42,6 +46,14 @@ class Record:
         """Identified values as the filter has them, q27."""
         return RECORD.unpack(self.content)[1 : 1 + STATES]
 
+    @property
+    def recalled(self) -> tuple[int, ...]:
+        """What a drive that takes this record starts with, in the order of kept()."""
+        _, *values = RECORD.unpack(self.content)
+        stored = zip(values[STATES : 2 * STATES], ADDED_VARIANCE_SHIFT, strict=True)
+        variances = [min(variance + (ONE_Q30 >> shift), ONE_Q30) for variance, shift in stored]
+        return (*values[:STATES], *variances, *values[2 * STATES :])
+
 
 def _record(slot: int, cells: bytes) -> Record | None:
     layout, size, sequence, crc = HEADER.unpack_from(cells)
@@ -57,6 +69,37 @@ def records(core: Core) -> list[Record]:
     cells = core.read(FLASH, FLASH_BYTES)
     found = (_record(k, cells[k * SLOT_BYTES : (k + 1) * SLOT_BYTES]) for k in range(SLOTS))
     return sorted((r for r in found if r is not None), key=lambda r: r.sequence)
+
+
+def _kept_members() -> Iterator[str]:
+    """The members of the drive's state that a record sets."""
+    diagonal = [j * (2 * STATES + 1 - j) // 2 for j in range(STATES)]  # the upper triangle, row by row
+    yield from (f"task.identify.kalman.x_q27[{j}]" for j in range(STATES))
+    yield from (f"task.identify.kalman.p_q30[{p}]" for p in diagonal)
+    yield from (f"task.compensation.{name}" for name in ("dead_time", "knee_q17", "measured"))
+    yield "task.trim.trim"
+
+
+def _place(parts: Parts, core: Core, member: str) -> tuple[int, Any]:
+    """Address and ctypes type of a member of the drive, which is the first member of the ECU."""
+    offset, kind = members(str(parts.image), "drive_t").place(member)
+    return core.symbol("ecu") + offset, kind
+
+
+def kept(parts: Parts, core: Core) -> tuple[int, ...]:
+    """The values in the drive's own state, found by their names in the image."""
+    places = (_place(parts, core, name) for name in _kept_members())
+    return tuple(kind.from_buffer_copy(core.read(address, sizeof(kind))).value for address, kind in places)
+
+
+def set_trim(parts: Parts, core: Core, trim: int) -> None:
+    """Gives the drive the trim that it would find after minutes with an inverter whose dead time is another; the
+    compensation, their sum, stays as it is."""
+    dead_time, kind = _place(parts, core, "parameters.modulate.dead_time_q16")
+    half = kind.from_buffer_copy(core.read(dead_time, sizeof(kind))).value // 2
+    for name, value in (("base", half - trim), ("trim", trim)):
+        address, kind = _place(parts, core, f"task.trim.{name}")
+        core.write(address, bytes(kind(value)))
 
 
 def fill(core: Core, last: int) -> None:
