@@ -99,6 +99,18 @@ def test_performance_that_has_changed_is_found(tree: Path) -> None:
     assert check(tree) == (1, ["docs/figures.toml:7: figure 'flash' reads '61 KiB', performance.json gives 62"])
 
 
+def test_a_place_of_a_spread_is_found_and_one_beyond_its_end_is_not(tree: Path) -> None:
+    (tree / "docs/performance.json").write_text(json.dumps({"image": {"flash": [1, 62688, 3]}}))
+    data = tree / "docs/figures.toml"
+    text = data.read_text()
+    data.write_text(text.replace('"image", "flash"', '"image", "flash", "1"'))
+    assert check(tree) == (0, [])
+    data.write_text(text.replace('"image", "flash"', '"image", "flash", "0"'))
+    assert check(tree) == (1, ["docs/figures.toml:7: figure 'flash' reads '61 KiB', performance.json gives 0"])
+    data.write_text(text.replace('"image", "flash"', '"image", "flash", "3"'))
+    assert check(tree)[1][0].endswith("figure 'flash': nothing at ['image', 'flash', '3']")
+
+
 def test_a_constant_that_has_changed_or_gone_is_found(tree: Path) -> None:
     source = tree / "firmware/ecu/supervisor.c"
     source.write_text(CODE.replace("2000U", "3000U"))

@@ -60,9 +60,11 @@ def page_problems(root: Path, known: dict[str, str]) -> Iterator[Violation]:
 
 
 def found_at(results: Any, path: list[str]) -> float:
-    """The number at a path of keys; "name=x" picks the entry of a list."""
+    """The number at a path of keys; of a list "name=x" picks an entry, a number the one at this place from 0 on."""
     for key in path:
-        if isinstance(results, list):
+        if isinstance(results, list) and key.isdecimal():
+            results = results[int(key)] if int(key) < len(results) else None
+        elif isinstance(results, list):
             name, _, value = key.partition("=")
             results = next((entry for entry in results if str(entry[name]) == value), None)
         else:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from fluxtrue_tools.bench import baseline, figures, page
+from fluxtrue_tools.emulate import build as emulation
 from fluxtrue_tools.errors import FluxtrueError
 
 COMMITTED = {"compiler": "gcc 1", "drives": {"robust": {"fast": [1, 2.5, 3]}}, "image": {"flash": 10}}
@@ -87,10 +88,32 @@ def test_the_tick_meets_its_bound_on_average_and_the_peers_stand_beside_the_one_
 def test_the_fast_interrupt_and_the_control_library_meet_their_bounds() -> None:
     figures = baseline.load()
     for drive in figures["drives"].values():
-        assert drive["runs"]["fast ISR"]["instructions"][1] <= 360
+        assert drive["runs"]["fast ISR"]["instructions"][1] <= page.ENCODER_MAX
     library = figures["control library"]
     assert library["code"] + library["constants"] <= 11.5 * 1024
-    assert (page.FAST_ISR_MAX, page.CODE_MAX) == (360, 11776)
+    assert (page.ENCODER_MAX, page.RESOLVER_MAX, page.CODE_MAX) == (360, 345, 11776)
+
+
+def _row_of_the_resolver(figures: page.Figures, mode: str) -> str:
+    begin = f"| **resolver, AD2S1210** | {mode}"
+    return next(line for line in page.page(figures).splitlines() if line.startswith(begin))
+
+
+def test_the_demanded_bound_of_the_fast_interrupt_is_that_of_the_image_with_the_resolver() -> None:
+    figures = baseline.load()
+    for mode in ("paper", "robust"):
+        spread = figures["sensors"]["resolver"]["runs"][mode]["fast ISR"]["instructions"]
+        assert spread[1] > figures["drives"][mode]["runs"]["fast ISR"]["instructions"][1]
+        assert ("avg ≤ 345 met" in _row_of_the_resolver(figures, mode)) == (spread[1] <= 345)
+        spread[1] = 345.1
+        assert "avg ≤ 345 **missed**" in _row_of_the_resolver(figures, mode)
+        spread[1] = 345.0
+        assert "avg ≤ 345 met" in _row_of_the_resolver(figures, mode)
+
+
+def test_every_sensor_that_an_image_can_have_stands_beside_the_encoder() -> None:
+    figures = baseline.load()
+    assert {"encoder", *figures["sensors"]} == set(emulation.FLASHED) == set(page.SENSORS)
 
 
 def test_the_maxima_contain_what_only_the_reactions_to_faults_have() -> None:

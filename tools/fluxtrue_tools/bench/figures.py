@@ -60,7 +60,7 @@ def _row(runs: NDArray[np.int64], reactions: NDArray[np.int64]) -> FIGURES:
 
 
 def _mode(
-    parts: emulation.Parts, functions: list[disassembly.Function], mode: int, watch: image.Watch
+    parts: emulation.Parts, functions: list[disassembly.Function], mode: int, watch: image.Watch | None = None
 ) -> tuple[FIGURES, int]:
     recording = image.record(parts, functions, mode, watch)
     rows: FIGURES = {}
@@ -75,6 +75,23 @@ def _mode(
     met = {"periods": recording.periods, "voltage limited": recording.limited, "beyond the tables": recording.clamped,
            "field weakening": recording.weakened, "reacting": len(recording.reactions_of(image.FAST))}  # fmt: skip
     return {"met": met, "runs": rows}, recording.stack_bytes
+
+
+def _sensor(angle: str, modes: dict[str, int], port: FIGURES) -> FIGURES:
+    """The interrupts of the image for another angle sensor in the drive of the encoder's image, and their shares of the
+    processor with the robust identification."""
+    parts = emulation.prepare("hsm1", angle=angle, flashed=True)
+    functions = disassembly.read(parts.image)
+    runs = {name: _mode(parts, functions, mode)[0]["runs"] for name, mode in modes.items()}
+    shares = {column: _utilisation(runs["robust"], port["core_Hz"], column) for column in COLUMNS[1:]}
+    return {"runs": runs, "utilisation": shares}
+
+
+def _sensors(port: FIGURES) -> FIGURES:
+    """The sensors but the encoder: the resolver, whose image is the one that has bounds, in both identifications."""
+    robust = {"robust": MODES["robust"]}
+    return {angle: _sensor(angle, MODES if angle == "resolver" else robust, port)
+            for angle in emulation.FLASHED if angle != "encoder"}  # fmt: skip
 
 
 def pointers(port: dict[str, Any], names: list[str]) -> dict[str, list[str]]:
@@ -132,7 +149,7 @@ def _worst(found: worst.Worst, watch: observed.Watch, drives: FIGURES) -> FIGURE
 
 
 def measure(folder: Path) -> FIGURES:
-    """Build what is missing below `folder` and measure all figures; this takes a minute or two."""
+    """Build what is missing below `folder` and measure all figures; this takes some minutes."""
     port = budget()
     parts = emulation.prepare("hsm1", flashed=True)
     functions = disassembly.read(parts.image)
@@ -156,6 +173,7 @@ def measure(folder: Path) -> FIGURES:
     return {
         "compiler": sizes.compiler(),
         "drives": drives,
+        "sensors": _sensors(port),
         "worst case": _worst(bounds, watch, drives),
         "utilisation": {name: {column: _utilisation(drive["runs"], port["core_Hz"], column) for column in COLUMNS[1:]}
                         for name, drive in drives.items()},
