@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 from flash_saves import Parts
 from listener import Listener
-from planting import PlantedError, image_with_error
+from planting import FIRMWARE, PORT, PlantedError, relinked, with_error
 
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.bench.image import Stand
@@ -22,6 +23,7 @@ from fluxtrue_tools.emulate.core import Core
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.library import Loop
 
+TRIM = 20  # q15: 0.06 % of the period
 POINTS = ((1500.0, 50.0), (2500.0, 20.0), (600.0, -40.0))
 
 
@@ -64,11 +66,19 @@ def test_a_drive_remembers_what_it_has_identified(parts: Parts) -> None:
         flash.drive(loop, flash_cuts.SHORT, 0.2)  # and it drives
 
 
-def test_the_values_recalled_are_those_of_the_record(parts: Parts, flashed: bytes) -> None:
-    with flash.key_on(parts, flashed) as (_, core):
+def test_the_values_recalled_are_those_of_the_drive(parts: Parts) -> None:
+    """Every value of the record: what the drive had when it saved is what the next start has, its variances grown."""
+    with flash.key_on(parts) as (loop, core):
+        flash.drive(loop, POINTS, 0.5)
+        flash.set_trim(parts, core, TRIM)
+        flash.until_saving(loop, core)
+        before = flash.kept(parts, core)
+        flash.until_saved(loop, core)
         (record,) = flash.records(core)
-        states = flash.RECORD.pack(*flash.RECORD.unpack(record.content))[4 : 4 + 4 * flash.STATES]
-        assert states in core.read(0x1FFF_8000, 0xF000)
+        assert flash.RECORD.unpack(record.content)[1:] == before
+        assert before[-1] == TRIM
+        flash.power_cycle(loop)
+        assert flash.kept(parts, core) == record.recalled
 
 
 def test_the_bus_image_remembers_too(flashed: bytes) -> None:
@@ -201,6 +211,14 @@ def torque_error_Nm(parts: Parts, memory: bytes | None) -> np.ndarray:
     return magnitude
 
 
+def stated_errors() -> list[list[float]]:
+    """Both rows of the README of the port, with the memory and without it."""
+    text = (PORT / "README.md").read_text(encoding="utf-8")
+    found = re.search(r"\| second \|.*\n.*\n(.*)\n(.*)\n", text)
+    assert found is not None
+    return [[float(cell) for cell in row.strip("|").split("|")[1:]] for row in found.groups()]
+
+
 def test_with_the_memory_the_first_torque_is_right(parts: Parts) -> None:
     """The magnet is 12 % weak and makes about two thirds of the torque.
 
@@ -212,7 +230,9 @@ def test_with_the_memory_the_first_torque_is_right(parts: Parts) -> None:
         flash.until_saved(loop, core)
         memory = core.read(flash.FLASH, flash.FLASH_BYTES)
     kept, first = torque_error_Nm(parts, memory), torque_error_Nm(parts, None)
-    print(f"with the memory {kept.round(2)}, without {first.round(2)} N·m")
+    print(f"with the memory {kept.round(2).tolist()}, without {first.round(2).tolist()} N·m")
+    for stated, measured in zip(stated_errors(), (kept, first), strict=True):
+        assert stated == pytest.approx(measured, abs=0.005 + 1e-9)
     assert kept[0] <= 0.6
     assert kept[1:].max() <= 0.3
     assert kept.mean() <= 0.2
@@ -224,7 +244,24 @@ def test_with_the_memory_the_first_torque_is_right(parts: Parts) -> None:
 
 @pytest.mark.parametrize("last", [0, flash.SLOTS - 1], ids=["blank slot", "sector to be erased"])
 def test_a_cut_at_every_step_leaves_the_old_or_the_new_record(parts: Parts, last: int) -> None:
-    assert flash_cuts.campaign(parts, 1, last) > 40
+    cuts = flash_cuts.campaign(parts, 1, last)
+    assert cuts.first > 40
+    assert cuts.second >= 5
+
+
+def test_a_mixture_is_neither_record(parts: Parts, flashed: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A start with some values of one record and the others of another one, however few, is found."""
+    with flash.key_on(parts, flashed) as (_, core):
+        (old,) = flash.records(core)
+        values = flash.RECORD.unpack(old.content)
+        new = replace(old, content=flash.RECORD.pack(values[0], *(value - 1 for value in values[1:])))
+        for k in range(len(old.recalled)):
+            mixture = (*new.recalled[:k], old.recalled[k], *new.recalled[k + 1 :])
+            assert mixture not in {old.recalled, new.recalled} or old.recalled[k] == new.recalled[k]
+            monkeypatch.setattr(flash, "kept", lambda *_, mixture=mixture: mixture)
+            if old.recalled[k] != new.recalled[k]:
+                with pytest.raises(AssertionError, match="neither"):
+                    flash_cuts.taken(parts, core, (old, new), "a cut")
 
 
 # ---- errors that the tests above must find
@@ -242,6 +279,7 @@ class Planted:
     error: PlantedError
     exception: type[Exception]
     message: str
+    also: PlantedError | None = None  # in another file
 
 
 NOT_IN_HSRUN = r"FTFC: a command must not be launched in HSRUN"
@@ -259,6 +297,26 @@ PLANTED_ERRORS: dict[str, Planted] = {
     ),
     "nothing is erased": Planted(
         cut, PlantedError("nvm.c", "flash_command(ERASE_SECTOR, slot, 0)", "true"), AssertionError, ""
+    ),
+    "the header is first and no checksum is compared": Planted(
+        cut,
+        PlantedError(
+            "store.c",
+            "program_record(slot, record, header->size) && hal_nvm_program(slot, 0, header, STORE_HEADER_SIZE)",
+            "hal_nvm_program(slot, 0, header, STORE_HEADER_SIZE) && program_record(slot, record, header->size)",
+            FIRMWARE / "storage",
+        ),
+        AssertionError,
+        r"cut \d+ at .* s: nothing is recalled",  # what is not yet written is not plausible
+        PlantedError("slot.c", "return ~sum == header->crc;", "return true;", FIRMWARE / "storage"),
+    ),
+    "the trim of the compensation is not recalled": Planted(
+        test_the_values_recalled_are_those_of_the_drive,
+        PlantedError(
+            "memory.c", "drive_restore_trim(drive, record->trim)", "drive_restore_trim(drive, 0)", FIRMWARE / "storage"
+        ),
+        AssertionError,
+        r"20",
     ),
     "the clock stays slow": Planted(
         test_switching_waits_until_the_save_is_complete,
@@ -278,6 +336,8 @@ PLANTED_ERRORS: dict[str, Planted] = {
 @pytest.mark.parametrize("name", PLANTED_ERRORS)
 def test_a_planted_error_is_found(name: str, parts: Parts, tmp_path: Path) -> None:
     planted = PLANTED_ERRORS[name]
-    image = image_with_error(parts.image, planted.error, tmp_path)
+    errors = [error for error in (planted.error, planted.also) if error is not None]
+    sources = {old: new for error in errors for old, new in with_error(error, tmp_path).items()}
+    image = relinked(parts.image, sources, tmp_path)
     with pytest.raises(planted.exception, match=planted.message):
         planted.check(replace(parts, image=image))

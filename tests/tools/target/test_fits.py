@@ -8,12 +8,15 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from load_table import SUM, load_rows
 
 from fluxtrue_tools.cli import main
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.motor import load_motor
 from fluxtrue_tools.target import fits
 
-PORT = Path(__file__).resolve().parents[3] / "hal" / "s32k144"
+ROOT = Path(__file__).resolve().parents[3]
+PORT = ROOT / "hal" / "s32k144"
 # The most cycles of a period's interrupts, a task, a received command, while driving and while reacting to a fault.
 COSTS = {"10 kHz work": (1000, 1100), "1 kHz task": (20000, 15000), "CAN ISR": (300, 300)}
 LAWS = {"usual": {"cycles": [1, 1, 100]}, "turning": {"cycles": [1, 1, 350]}}
@@ -102,6 +105,24 @@ def test_the_s32k144_carries_every_frequency_that_a_motor_may_have(tmp_path, pwm
     motor = tmp_path / "motor.json"
     motor.write_text(json.dumps({"machine": SLOW, "inverter": {"pwm_hz": pwm_hz, "dead_time_s": 2e-6}}))
     assert "busy for at most" in fits.check(motor, PORT / "budget.toml")
+
+
+def _busy_share(khz):
+    """Of hsm1 at this frequency, by the committed costs."""
+    folder = ROOT / "firmware" / "motors" / "hsm1" if khz == 10 else ROOT / "tests" / "motors" / f"hsm1_{khz:g}kHz"
+    config = load_motor(folder).config
+    built = fits.Built.model_validate({
+        "machine": {"pole_pairs": config.machine.pole_pairs, "speed_max_rpm": config.machine.speed_max_rpm},
+        "inverter": {"pwm_hz": config.inverter.pwm_hz, "dead_time_s": config.inverter.dead_time_s},
+    })  # fmt: skip
+    return fits.busy_share(built, _port()["core_Hz"], json.loads(fits.MEASURED.read_text(encoding="utf-8")))
+
+
+def test_the_readme_of_the_port_states_the_sums_of_the_largest_times():
+    """The loads beside them are compared by tests/target/s32k144/test_frequencies.py."""
+    stated = {khz: cells[SUM] for khz, cells in load_rows().items()}
+    assert list(stated) == [5, 8, 10, 16, 20, 40]
+    assert stated == {khz: f"{100 * _busy_share(khz):.1f} %" for khz in stated}
 
 
 def test_on_the_command_line_a_refusal_is_one_message(tmp_path):
