@@ -114,6 +114,11 @@ def test_the_demanded_bound_of_the_fast_interrupt_is_that_of_the_image_with_the_
 def test_every_sensor_that_an_image_can_have_stands_beside_the_encoder() -> None:
     figures = baseline.load()
     assert {"encoder", *figures["sensors"]} == set(emulation.FLASHED) == set(page.SENSORS)
+    for sensor in figures["sensors"].values():
+        executed = max(run["fast ISR"]["instructions"][2] for run in sensor["runs"].values())
+        bound = sensor["bounds"]["fast ISR"]["instructions"]
+        assert executed <= bound
+        assert sum(f"| {executed} | {bound} |" in line for line in page.page(figures).splitlines()) >= 1
 
 
 def test_the_maxima_contain_what_only_the_reactions_to_faults_have() -> None:

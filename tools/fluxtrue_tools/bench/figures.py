@@ -60,7 +60,7 @@ def _row(runs: NDArray[np.int64], reactions: NDArray[np.int64]) -> FIGURES:
 
 
 def _mode(
-    parts: emulation.Parts, functions: list[disassembly.Function], mode: int, watch: image.Watch | None = None
+    parts: emulation.Parts, functions: list[disassembly.Function], mode: int, watch: image.Watch
 ) -> tuple[FIGURES, int]:
     recording = image.record(parts, functions, mode, watch)
     rows: FIGURES = {}
@@ -75,23 +75,6 @@ def _mode(
     met = {"periods": recording.periods, "voltage limited": recording.limited, "beyond the tables": recording.clamped,
            "field weakening": recording.weakened, "reacting": len(recording.reactions_of(image.FAST))}  # fmt: skip
     return {"met": met, "runs": rows}, recording.stack_bytes
-
-
-def _sensor(angle: str, modes: dict[str, int], port: FIGURES) -> FIGURES:
-    """The interrupts of the image for another angle sensor in the drive of the encoder's image, and their shares of the
-    processor with the robust identification."""
-    parts = emulation.prepare("hsm1", angle=angle, flashed=True)
-    functions = disassembly.read(parts.image)
-    runs = {name: _mode(parts, functions, mode)[0]["runs"] for name, mode in modes.items()}
-    shares = {column: _utilisation(runs["robust"], port["core_Hz"], column) for column in COLUMNS[1:]}
-    return {"runs": runs, "utilisation": shares}
-
-
-def _sensors(port: FIGURES) -> FIGURES:
-    """The sensors but the encoder: the resolver, whose image is the one that has bounds, in both identifications."""
-    robust = {"robust": MODES["robust"]}
-    return {angle: _sensor(angle, MODES if angle == "resolver" else robust, port)
-            for angle in emulation.FLASHED if angle != "encoder"}  # fmt: skip
 
 
 def pointers(port: dict[str, Any], names: list[str]) -> dict[str, list[str]]:
@@ -148,6 +131,33 @@ def _worst(found: worst.Worst, watch: observed.Watch, drives: FIGURES) -> FIGURE
     return {"bounds": found.figures, "loops": loops, "loops entered": entered}
 
 
+def _bounds(parts: emulation.Parts, functions: list[disassembly.Function], port: FIGURES) -> worst.Worst:
+    """Upper bounds of the handlers of an image."""
+    names = [function.name for function in functions]
+    return worst.bounds(wcet.Image.read(parts.image), facts.load(), pointers(port, names))
+
+
+def _sensor(angle: str, modes: dict[str, int], port: FIGURES) -> FIGURES:
+    """The interrupts of the image for another angle sensor in the drive of the encoder's image, their bounds, and their
+    shares of the processor with the robust identification."""
+    parts = emulation.prepare("hsm1", angle=angle, flashed=True)
+    functions = disassembly.read(parts.image)
+    bounds = _bounds(parts, functions, port)
+    watch = observed.Watch(bounds.plan())
+    drives = {name: _mode(parts, functions, mode, watch)[0] for name, mode in modes.items()}
+    runs = {name: drive["runs"] for name, drive in drives.items()}
+    shares = {column: _utilisation(runs["robust"], port["core_Hz"], column) for column in COLUMNS[1:]}
+    found = _worst(bounds, watch, drives)["bounds"][worst.OF_DRIVE]
+    return {"runs": runs, "utilisation": shares, "bounds": {name: found[name] for name in ("fast ISR", "1 kHz task")}}
+
+
+def _sensors(port: FIGURES) -> FIGURES:
+    """The sensors but the encoder: the resolver, whose image is the one that has bounds, in both identifications."""
+    robust = {"robust": MODES["robust"]}
+    return {angle: _sensor(angle, MODES if angle == "resolver" else robust, port)
+            for angle in emulation.FLASHED if angle != "encoder"}  # fmt: skip
+
+
 def measure(folder: Path) -> FIGURES:
     """Build what is missing below `folder` and measure all figures; this takes some minutes."""
     port = budget()
@@ -156,8 +166,7 @@ def measure(folder: Path) -> FIGURES:
     uses, problems = stack_use(functions, port)
     if problems:
         raise FluxtrueError("the image's stack is not bounded:\n  " + "\n  ".join(problems))
-    names = [function.name for function in functions]
-    bounds = worst.bounds(wcet.Image.read(parts.image), facts.load(), pointers(port, names))
+    bounds = _bounds(parts, functions, port)
     watch = observed.Watch(bounds.plan())
     drives: FIGURES = {}
     deepest = 0

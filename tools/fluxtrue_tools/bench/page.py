@@ -142,6 +142,22 @@ def _sensors(figures: Figures) -> list[str]:
     return table(head + "|bound of the image with the resolver", rows)
 
 
+def _sensor_bounds(figures: Figures) -> list[str]:
+    """The fast ISR of each sensor's image: what was executed at most, and the upper bound."""
+    drives = figures["drives"], figures["worst case"]["bounds"]["driving"]
+    images = {"encoder": ({name: drive["runs"] for name, drive in drives[0].items()}, drives[1])}
+    images |= {angle: (sensor["runs"], sensor["bounds"]) for angle, sensor in figures["sensors"].items()}
+    rows = []
+    for angle, title in SENSORS.items():
+        runs, bounds = images[angle]
+        row: list[object] = [title]
+        for column in ("instructions", "cycles", "most"):
+            row += [max(run["fast ISR"][column][2] for run in runs.values()), bounds["fast ISR"][column]]
+        rows.append(row)
+    head = "angle sensor|  instructions executed |  bound |  cycles executed |  bound |"
+    return table(head + "  most waiting, executed |  bound ", rows)
+
+
 def _sensor_shares(figures: Figures) -> str:
     """The processor's load with the resolver beside the encoder's, in a sentence."""
     name = "with task and CAN, average"
@@ -330,7 +346,8 @@ def page(figures: Figures) -> str:
         "task_contents": _contents(kernels["task stages"], TASK_TITLES, TASK_CONTAINS),
         "waiting": _waiting(figures), "worst": _worst(figures), "assumptions": _assumptions(),
         "interrupts": _interrupts(figures), "utilisation": _utilisation(figures), "kernels": _kernels(figures),
-        "sensors": _sensors(figures), "laws": _laws(figures), "task_stages": _task_stages(figures),
+        "sensors": _sensors(figures), "sensor_bounds": _sensor_bounds(figures),
+        "laws": _laws(figures), "task_stages": _task_stages(figures),
         "peers": _peers(figures), "memory": _memory(figures), "modules": _modules(figures), "stack": _stack(figures),
     }  # fmt: skip
     text = Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
