@@ -19,6 +19,8 @@ RPM = 0.10471975511965978  # rad/s
 FAST_RPM = 9000.0  # 351 V of line voltage; the short circuit is chosen above 8085 rpm
 BATTERY_V = 350.0
 PROTECTION = 1
+TEMPERATURE = 1 << 14
+SHORT_CIRCUIT_A = -243.0  # i_d of hsm1 that cancels the magnets' flux
 OFF, RUNS = 0.0, 1.0  # run_state
 I_MAX_A = 250.0  # of both machines
 
@@ -105,6 +107,24 @@ def worst(ecu: Ecu, milliseconds: int) -> Worst:
     return Worst(torque, current)
 
 
+@dataclass(frozen=True)
+class Instant:
+    """At the end of a millisecond; the torque is its mean."""
+
+    torque_Nm: float
+    i_d_A: float
+    fault_word: int
+
+
+def watched(ecu: Ecu, milliseconds: int) -> list[Instant]:
+    """Each millisecond of a run."""
+    seen = []
+    for _ in range(milliseconds):
+        ecu.run(1)
+        seen.append(Instant(ecu.truth("torque_mean_Nm"), ecu.truth("i_d_A"), int(ecu.get("fault_word"))))
+    return seen
+
+
 def leaves_torque_gently(ecu: Ecu) -> None:
     """Enable goes off: little torque, little current, no fault, and enabled again at once."""
     ecu.command["Enable"] = 0
@@ -145,6 +165,42 @@ def test_enable_off_at_speed_is_gentle_latches_nothing_and_can_be_taken_back(fas
     turn_to(fast, 0.0 if rpm < 0.0 else rpm, 2.0)
     turn_to(fast, rpm, 2.0)
     leaves_torque_gently(fast)
+
+
+# 6 ms before the torque begins to fall, then the ramp of 15 ms from full torque with its settling; measured 16 to 26 ms.
+@pytest.mark.parametrize(("rpm", "torque_Nm"), [(8200.0, 45.0), (9000.0, 40.0), (10000.0, 30.0), (-9500.0, -30.0)])
+def test_enable_off_at_speed_ends_the_torque_of_a_loaded_machine_in_50_ms(
+    fast: Ecu, rpm: float, torque_Nm: float
+) -> None:
+    turn_to(fast, 0.0 if rpm < 0.0 else rpm, 2.0)
+    turn_to(fast, rpm, 2.0)
+    fast.run(200, TorqueRequested=torque_Nm)
+    assert fast.truth("torque_mean_Nm") == pytest.approx(torque_Nm, abs=2.0)
+    fast.command["Enable"] = 0
+    low, high = min(0.0, torque_Nm) - 2.0, max(0.0, torque_Nm) + 2.0
+    assert all(low < each.torque_Nm < high for each in watched(fast, 50))
+    leaves_torque_gently(fast)
+
+
+# (SS-8): 8 steps towards the short circuit's 243 A, 2 steps with them. A fault that is latched without them makes 98 N.m.
+@pytest.mark.parametrize(("rpm", "torque_Nm"), [(9000.0, 40.0), (10000.0, 30.0), (-9500.0, -30.0)])
+def test_an_overheated_drive_moves_its_currents_for_10_ms_before_the_short_circuit(
+    fast: Ecu, rpm: float, torque_Nm: float
+) -> None:
+    turn_to(fast, 0.0 if rpm < 0.0 else rpm, 2.0)
+    turn_to(fast, rpm, 2.0)
+    fast.run(200, TorqueRequested=torque_Nm)
+    assert fast.truth("torque_mean_Nm") == pytest.approx(torque_Nm, abs=2.0)
+    assert fast.lib.sim_set(fast.sim, b"inverter_C", 120.0) == 0
+    seen = watched(fast, 300)
+    at = next(k for k, each in enumerate(seen) if each.fault_word)  # the millisecond in which the fault is latched
+    assert seen[at].fault_word == TEMPERATURE
+    before = seen[at - 12].i_d_A
+    moved = [(each.i_d_A - before) / (SHORT_CIRCUIT_A - before) for each in seen[at - 11 : at]]
+    wanted = [0.0] + [min(k, 8) / 8.0 for k in range(1, 11)]
+    assert moved == pytest.approx(wanted, abs=0.04)
+    assert max(abs(each.torque_Nm) for each in seen[at - 11 :]) < 5.0
+    assert max(abs(each.i_d_A) for each in seen) < 1.1 * abs(SHORT_CIRCUIT_A)
 
 
 # The short circuit of this machine takes 420 A, beyond its converters, and brakes with 8.9 N.m when it is cold.

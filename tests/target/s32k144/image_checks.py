@@ -19,6 +19,7 @@ SLACK_S = 1 / 112e6
 ALL_OUTPUTS, NO_OUTPUTS = 0x3F, 0
 DRIVING_NM = 80.0
 WINDING_TRIP_C = 230.0  # firmware/motors/hsm1/motor.toml
+INVERTER_TRIP_C = 105.0  # its default
 INPUT, TEMPERATURE, GATE = 1 << 5, 1 << 14, 1 << 15
 FAULTF = 0x80
 ENCACHE = 1
@@ -144,6 +145,20 @@ def a_winding_at_the_end_of_its_line_trips(parts: Parts) -> None:
         assert abs(loop.get("truth.torque_Nm")) < 1.0
 
 
+def an_inverter_at_the_end_of_its_line_trips(parts: Parts) -> None:
+    """Likewise, through the second thermistor."""
+    with driving(parts) as (loop, core):
+        loop.set("emulator.inverter_C", INVERTER_TRIP_C - 6.0)
+        loop.run(2000)
+        assert loop.get("fault_word") == 0
+        assert 10.0 < loop.get("truth.torque_Nm") < 0.7 * DRIVING_NM, "below the trip the torque is derated"
+        loop.set("emulator.inverter_C", INVERTER_TRIP_C + 10.0)
+        loop.run(1300)
+        assert int(loop.get("fault_word")) == TEMPERATURE
+        assert core.outputs == NO_OUTPUTS
+        assert abs(loop.get("truth.torque_Nm")) < 1.0
+
+
 def a_wrong_reference_of_the_converters_is_found(parts: Parts) -> None:
     """By the count of the bandgap; 10 ms are the confirmation."""
     with driving(parts) as (loop, core):
@@ -207,6 +222,7 @@ CHECKS = (
     a_stack_that_uses_its_reserve_resets,
     the_code_cache_is_on,
     a_winding_at_the_end_of_its_line_trips,
+    an_inverter_at_the_end_of_its_line_trips,
     a_wrong_reference_of_the_converters_is_found,
     a_shorted_switch_ends_in_the_short_circuit_on_its_side,
     a_short_circuit_that_the_drivers_end_is_made_on_the_other_side,

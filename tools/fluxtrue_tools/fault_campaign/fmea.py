@@ -21,6 +21,7 @@ RECORDED: Final = ("status", "witness", "result")  # written by --record
 SAFE_STATE, BOUNDED, LESS, KEEP, RAMP = "safe_state", "bounded", "less", "keep", "ramp"
 REACTIONS: Final = (SAFE_STATE, BOUNDED, LESS, KEEP, RAMP)
 MET, PHYSICS, OPEN = "met", "physics", "open"
+NO_EFFECT: Final = "no effect"  # verdict of a run, not the status of a line: nothing was there to react to
 STATUSES: Final = (MET, PHYSICS, OPEN)  # physics: met, in some runs only as well as the best safe state
 _ID: Final = re.compile(r"[a-z0-9]+(?:-[a-z0-9]+)*")
 _STEP: Final = re.compile(
@@ -96,6 +97,11 @@ class Row:
     status: str
     witness: str
     text: dict[str, str]
+
+    @property
+    def must_act(self) -> bool:
+        """Whether a run without any effect shows nothing: a change of the memory to which a reaction is demanded."""
+        return bool(self.expected) and any(step.name.startswith("memory.") for step in self.injection)
 
     def holds_at(self, point: Point) -> bool:
         """Whether the line speaks of this operating point."""

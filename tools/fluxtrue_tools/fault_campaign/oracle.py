@@ -13,13 +13,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from fluxtrue_tools.fault_campaign.measure import Outcome, outcome
+import numpy as np
+
+from fluxtrue_tools.fault_campaign.measure import Outcome, mean, outcome
 from fluxtrue_tools.fault_campaign.run_point import CHANNELS, Trace
 
 OFF, LOWER, UPPER = "switching disabled", "short circuit below", "short circuit above"
 BRIDGE: Final = {OFF: 1, LOWER: 2, UPPER: 3}  # plant.imposed_bridge (PL-31)
 SHORT: Final = {OFF: "off", LOWER: "lower", UPPER: "upper"}  # in the names of the results' columns
 MARGIN: Final = 1.1
+ACTS_NM: Final = 1.0  # a smaller change of the shaft torque is none
 
 
 @dataclass(frozen=True)
@@ -83,6 +86,12 @@ def effect_ms(trace: Trace, healthy: Trace) -> float:
     columns = [CHANNELS.index(name) for name in CHANNELS if name.startswith("truth.")]
     differs = (trace.rows[:, columns] != healthy.rows[:, columns]).any(axis=1)
     return max(0.0, float(trace.time_ms[differs.argmax()]) - 1e3 * trace.period_s) if differs.any() else math.inf
+
+
+def acts(trace: Trace, healthy: Trace) -> bool:
+    """Whether the shaft torque, as its mean over 5 ms, ever departs from that of the run without the fault."""
+    torque = [mean(each["truth.torque_shaft_mean_Nm"], each.period_s) for each in (trace, healthy)]
+    return bool((np.abs(torque[0] - torque[1]) > ACTS_NM).any())
 
 
 def reference(entry_ms: float, safe_ms: float, limits: Outcome, imposed: Callable[[int, float], Trace]) -> Reference:

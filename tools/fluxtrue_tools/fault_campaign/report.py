@@ -10,12 +10,13 @@ import jinja2
 import pandas as pd
 
 from fluxtrue_tools.campaign.terminal import columns
-from fluxtrue_tools.fault_campaign.fmea import MET, OPEN, PHYSICS
+from fluxtrue_tools.fault_campaign.fmea import MET, NO_EFFECT, OPEN, PHYSICS
 from fluxtrue_tools.fault_campaign.oracle import MARGIN
 from fluxtrue_tools.fault_campaign.plan import Plan
 from fluxtrue_tools.fault_campaign.score import Score, Summary
 
-PLAIN: Final = {MET: "met", PHYSICS: "as good as physics allows", OPEN: "not met"}
+PLAIN: Final = {MET: "met", PHYSICS: "as good as physics allows", OPEN: "not met",
+               NO_EFFECT: "without effect"}  # fmt: skip
 
 
 def _text(value: float, digits: int = 1) -> str:
@@ -34,7 +35,8 @@ def terminal(scores: list[Score], summary: Summary) -> str:
                           said if s.is_true else f"status {s.row.status} is NOT TRUE. {said}"))  # fmt: skip
     sums = (f"{summary.kinds} kinds of fault, {summary.lines} lines, {summary.runs} runs: {summary.runs_met} "
             f"({summary.share:.2f} %) as demanded, of these {summary.runs_by_physics} beyond a limit and as good as "
-            f"physics allows (in {summary.runs_by_effect} the fault had no effect at first); "
+            f"physics allows (in {summary.runs_by_effect} the fault had no effect at first); {summary.runs_idle} without "
+            f"effect, not counted; "
             f"{summary.lines_met} lines met, {summary.lines_by_physics} met with such runs, "
             f"{summary.lines_open} open, {summary.false_trips} false trips")  # fmt: skip
     return (columns(cells) + "\n\n" if len(cells) > 1 else "") + sums
@@ -61,7 +63,7 @@ def summary_data(plan: Plan, scores: list[Score], summary: Summary) -> dict[str,
 
     lines = [
         {"id": s.row.id, "status": s.row.status, "is_met": s.is_met, "is_true": s.is_true, "runs": s.runs,
-         "met": s.met, "by_physics": s.by_physics, "found": s.status,
+         "met": s.met, "by_physics": s.by_physics, "idle": s.idle, "found": s.status,
          "detect_ms": plain(s.detect_ms), "harm_ms": plain(s.harm_ms), "beyond_Nm": plain(s.beyond_Nm),
          "current_A": plain(s.current_A), "vdc_V": plain(s.vdc_V), "worst": s.worst, "why": s.why}
         for s in scores

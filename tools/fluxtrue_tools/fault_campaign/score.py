@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from fluxtrue_tools.fault_campaign.fmea import KEEP, MET, OPEN, PHYSICS, RAMP, Row
+from fluxtrue_tools.fault_campaign.fmea import KEEP, MET, NO_EFFECT, OPEN, PHYSICS, RAMP, Row
 
 
 @dataclass(frozen=True)
@@ -17,6 +17,7 @@ class Score:
     runs: int
     met: int  # by_physics included
     by_physics: int  # beyond a limit, but as good as physics allows
+    idle: int  # without effect: neither as demanded nor open
     detect_ms: float
     harm_ms: float
     beyond_Nm: float
@@ -28,8 +29,8 @@ class Score:
 
     @property
     def is_met(self) -> bool:
-        """In every run."""
-        return self.met == self.runs
+        """In every run that has an effect, of which there must be one."""
+        return self.met > 0 and self.met + self.idle == self.runs
 
     @property
     def status(self) -> str:
@@ -38,7 +39,11 @@ class Score:
 
     @property
     def is_true(self) -> bool:
-        """Whether the table agrees with the results; other runs may be better than the table's, never worse."""
+        """Whether the table agrees with the results; other runs may be better than the table's, never worse.
+
+        No status is true of a line that never has an effect: it tests nothing."""
+        if self.idle == self.runs:
+            return False
         if not self.is_host:
             return self.row.status == OPEN or self.status != OPEN
         return self.row.status == self.status
@@ -54,12 +59,17 @@ class Score:
         """For the table: the latest times and largest values, and what is not met."""
         detect = "–" if math.isnan(self.detect_ms) else f"{self.detect_ms:.1f}"
         figures = f"fault {detect} ms, torque safe {self.harm_ms:.0f} ms, {self.current_A:.0f} A, {self.vdc_V:.0f} V"
-        return "; ".join(filter(None, (figures, self.physics, self.missed)))
+        idle = f"{self.idle} of {self.runs} runs without effect" if self.idle else ""
+        return "; ".join(filter(None, (figures, idle, self.physics, self.missed)))
 
     @property
     def missed(self) -> str:
         """What is not met, and where."""
-        return "" if self.is_met else f"{self.runs - self.met} of {self.runs} runs not met; {self.worst}: {self.why}"
+        if self.is_met:
+            return ""
+        if self.idle == self.runs:
+            return "WITHOUT EFFECT: neither a fault nor the shaft torque shows the change in any run"
+        return f"{self.runs - self.met - self.idle} of {self.runs} runs not met; {self.worst}: {self.why}"
 
 
 def _name(run: "pd.Series[object]") -> str:
@@ -67,14 +77,14 @@ def _name(run: "pd.Series[object]") -> str:
 
 
 def _score(row: Row, runs: pd.DataFrame, is_host: bool) -> Score:
-    by_physics, missed = runs[runs["verdict"] == PHYSICS], runs[~runs["met"]]
+    by_physics, missed = runs[runs["verdict"] == PHYSICS], runs[runs["verdict"] == OPEN]
     worst, why = "", ""
     if len(told := missed if len(missed) else by_physics):
         order = told.assign(size=told["beyond_Nm"] + told["detect_ms"].isna() * 1e3)
         first = order.loc[order["size"].idxmax()]
         worst, why = _name(first), str(first["why"])
-    return Score(row, len(runs), int(runs["met"].sum()), len(by_physics), float(runs["detect_ms"].max()),
-                 float(runs["harm_ms"].max()), float(runs["beyond_Nm"].max()), float(runs["current_A"].max()),
+    return Score(row, len(runs), int(runs["met"].sum()), len(by_physics),
+                 int((runs["verdict"] == NO_EFFECT).sum()), float(runs["detect_ms"].max()), float(runs["harm_ms"].max()), float(runs["beyond_Nm"].max()), float(runs["current_A"].max()),
                  float(runs["vdc_V"].max()), worst, why, is_host)  # fmt: skip
 
 
@@ -94,6 +104,7 @@ class Summary:
     runs_met: int  # runs_by_physics included
     runs_by_physics: int
     runs_by_effect: int  # of these, whose times count from the first effect of the fault
+    runs_idle: int  # without effect: not counted as demanded
     lines_met: int
     lines_by_physics: int
     false_trips: int
@@ -101,8 +112,8 @@ class Summary:
 
     @property
     def share(self) -> float:
-        """The share of the runs in percent."""
-        return 100.0 * self.runs_met / self.runs if self.runs else math.nan
+        """The share of the runs in percent; those without effect are not counted."""
+        return 100.0 * self.runs_met / (self.runs - self.runs_idle) if self.runs > self.runs_idle else math.nan
 
     @property
     def lines_open(self) -> int:
@@ -117,6 +128,7 @@ def summarise(scores: list[Score], table: pd.DataFrame) -> Summary:
     return Summary(
         len({(s.row.element, s.row.failure) for s in scores}), len(scores), len(table), int(table["met"].sum()),
         sum(s.by_physics for s in scores), int(((table["verdict"] == PHYSICS) & table["effect_ms"].notna()).sum()),
+        sum(s.idle for s in scores),
         sum(s.status == MET for s in scores),
         sum(s.status == PHYSICS for s in scores), len(false), tuple(s.row.id for s in scores if not s.is_true),
     )  # fmt: skip

@@ -5,7 +5,8 @@ Torque is safe between zero and the requested torque, widened by max(10 N·m, 5 
 torque is therefore safe; too much torque or torque of the wrong sign is not. Where a line bounds the movement of the
 vehicle against the request, wrong torque may last until the fault. A run whose fault came in time, but whose torque or
 current exceeds its limit in the safe state, is compared with the three safe states themselves; if it is as good as the
-best of them, its verdict says so.
+best of them, its verdict says so. A change of the memory that neither the drive's detection nor the shaft torque
+notices has no effect: such a run is not counted as demanded, because it could not have failed.
 """
 
 import math
@@ -15,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from fluxtrue_tools.fault_campaign import measure, oracle
-from fluxtrue_tools.fault_campaign.fmea import BOUNDED, KEEP, LESS, MET, OPEN, PHYSICS, RAMP, Point, Row
+from fluxtrue_tools.fault_campaign.fmea import BOUNDED, KEEP, LESS, MET, NO_EFFECT, OPEN, PHYSICS, RAMP, Point, Row
 from fluxtrue_tools.fault_campaign.measure import MEAN_MS, Outcome
 from fluxtrue_tools.fault_campaign.run_point import Trace
 from fluxtrue_tools.fault_campaign.spec import Bounded
@@ -39,8 +40,8 @@ class Verdict:
     current_A: float
     vdc_V: float
     state: int
-    verdict: str  # met; physics: as good as the best safe state; open
-    met: bool  # not open
+    verdict: str  # met; physics: as good as the best safe state; open; no effect: neither fault nor other torque
+    met: bool  # as demanded: neither open nor without effect
     why: str  # what the plain demand complains of, and the reference
 
 
@@ -132,8 +133,10 @@ def evaluate(row: Row, bounds: Bounded, rated_Nm: float, point: Point, trace: Tr
     verdict, cells, why = OPEN if found else MET, oracle.NO_CELLS, "; ".join(found.values())
     if found and reruns is not None:
         verdict, cells, why = run.compared(found, reruns)
+    elif reruns is not None and row.must_act and not run.v["first_fault"]:
+        verdict = MET if oracle.acts(trace, reruns.healthy()) else NO_EFFECT
     return {
         "row": row.id, "motor": point.motor, "point": point.index, "sign": point.sign, "speed_rpm": point.speed_rpm,
-        "torque_Nm": point.torque_Nm, **asdict(Verdict(**run.v, verdict=verdict, met=verdict != OPEN, why=why)),
+        "torque_Nm": point.torque_Nm, **asdict(Verdict(**run.v, verdict=verdict, met=verdict in (MET, PHYSICS), why=why)),
         **cells,
     }  # fmt: skip
