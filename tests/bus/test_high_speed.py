@@ -167,7 +167,7 @@ def test_enable_off_at_speed_is_gentle_latches_nothing_and_can_be_taken_back(fas
     leaves_torque_gently(fast)
 
 
-# 6 ms before the torque begins to fall, then the ramp of 15 ms from full torque with its settling; measured 16 to 26 ms.
+# Until the command arrives, 15 ms of ramp from full torque, settling: the torque is below 5 N.m after 16 to 25 ms.
 @pytest.mark.parametrize(("rpm", "torque_Nm"), [(8200.0, 45.0), (9000.0, 40.0), (10000.0, 30.0), (-9500.0, -30.0)])
 def test_enable_off_at_speed_ends_the_torque_of_a_loaded_machine_in_50_ms(
     fast: Ecu, rpm: float, torque_Nm: float
@@ -182,7 +182,7 @@ def test_enable_off_at_speed_ends_the_torque_of_a_loaded_machine_in_50_ms(
     leaves_torque_gently(fast)
 
 
-# (SS-8): 8 steps towards the short circuit's 243 A, 2 steps with them. A fault that is latched without them makes 98 N.m.
+# (SS-8): 8 steps towards the 243 A of the short circuit, 2 steps with them. A short circuit at once makes 98 N.m.
 @pytest.mark.parametrize(("rpm", "torque_Nm"), [(9000.0, 40.0), (10000.0, 30.0), (-9500.0, -30.0)])
 def test_an_overheated_drive_moves_its_currents_for_10_ms_before_the_short_circuit(
     fast: Ecu, rpm: float, torque_Nm: float

@@ -5,13 +5,15 @@ import math
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.fault_campaign import fmea
-from fluxtrue_tools.fault_campaign.fmea import COLUMNS, MET, OPEN, PHYSICS, Point, Row
+from fluxtrue_tools.fault_campaign.fmea import COLUMNS, MET, NO_EFFECT, OPEN, PHYSICS, Point, Row
 from fluxtrue_tools.fault_campaign.oracle import BRIDGE, LOWER, OFF, UPPER, Reruns
 from fluxtrue_tools.fault_campaign.run_point import BEFORE_MS, CHANNELS, Trace
+from fluxtrue_tools.fault_campaign.score import Score, score, summarise
 from fluxtrue_tools.fault_campaign.spec import Bounded
 from fluxtrue_tools.fault_campaign.verdict import evaluate
 from fluxtrue_tools.sim.ecu_loop import RUN, EcuLoop
@@ -265,6 +267,58 @@ def test_too_little_torque_is_allowed_where_the_line_says_so_and_too_much_is_not
     assert verdict(line, trace())["met"]
     assert not verdict(line, trace(fault_ms=math.inf, torque=lambda t: np.where(t < 0, 60.0, 71.0)))["met"]
     assert not verdict(line, trace(fault_ms=math.inf, torque=lambda t: np.where(t < 0, 60.0, -11.0)))["met"]
+
+
+# A bit that nothing reads, one that moves the torque by less than 1 N·m, one that moves it for 10 ms within its
+# tolerance, and one that the drive finds.
+@pytest.mark.parametrize(
+    ("run", "found"),
+    [
+        ({"fault_ms": math.inf, "torque": lambda t: np.full(t.shape, 60.0)}, NO_EFFECT),
+        ({"fault_ms": math.inf, "torque": lambda t: 60.0 + 0.9 * (t > 0.0)}, NO_EFFECT),
+        ({"fault_ms": math.inf, "torque": lambda t: 60.0 - 5.0 * ((t > 0.0) & (t < 10.0))}, MET),
+        ({"fault_ms": 5.0}, MET),
+    ],
+)
+def test_a_change_of_the_memory_that_nothing_notices_has_no_effect(run: dict[str, Any], found: str) -> None:
+    healthy = trace(fault_ms=math.inf, torque=lambda t: np.full(t.shape, 60.0))
+    states = States(*[healthy] * 3, healthy=healthy)
+    line = row(injection="memory.drive.unused=^1", reaction="bounded", expected="any")
+    judged = evaluate(line, BOUNDS, 132.0, POINT, trace(**run), states.reruns)
+    assert (judged["verdict"], judged["met"]) == (found, found == MET)
+
+
+def test_where_no_fault_is_demanded_nothing_needs_to_happen() -> None:
+    steady = trace(fault_ms=math.inf, state=RUN, torque=lambda t: np.full(t.shape, 60.0))
+    for cells in ({"injection": "memory.board.broken=1", "reaction": "keep", "expected": ""}, {"reaction": "bounded"}):
+        assert evaluate(row(**cells), BOUNDS, 132.0, POINT, steady, States(*[steady] * 3).reruns)["verdict"] == MET
+
+
+def scored(*verdicts: str, status: str = MET) -> Score:
+    """A line of which each run has one of these verdicts."""
+    line = row(injection="memory.drive.unused=^1", status=status)
+    runs = [verdict(line, trace()) | {"verdict": each, "met": each in (MET, PHYSICS)} for each in verdicts]
+    return score((line,), pd.DataFrame(runs))[0]
+
+
+def test_a_line_that_never_has_an_effect_is_open_and_no_status_is_true_of_it() -> None:
+    for status in (MET, PHYSICS, OPEN):
+        never = scored(NO_EFFECT, NO_EFFECT, status=status)
+        assert (never.status, never.is_true) == (OPEN, False)
+        assert "WITHOUT EFFECT" in never.result
+    some = scored(MET, NO_EFFECT, NO_EFFECT)
+    assert (some.status, some.is_true, some.met, some.idle) == (MET, True, 1, 2)
+    assert "2 of 3 runs without effect" in some.result
+    assert scored(OPEN, NO_EFFECT).status == OPEN
+    assert "1 of 2 runs not met" in scored(OPEN, NO_EFFECT).result
+
+
+def test_runs_without_effect_are_not_counted_as_demanded() -> None:
+    one = scored(MET, NO_EFFECT, NO_EFFECT, OPEN)
+    table = pd.DataFrame({"row": ["a-line"] * 4, "verdict": [MET, NO_EFFECT, NO_EFFECT, OPEN], "first_fault": [""] * 4,
+                          "met": [True, False, False, False], "effect_ms": [math.nan] * 4})  # fmt: skip
+    summary = summarise([one], table)
+    assert (summary.runs, summary.runs_met, summary.runs_idle, summary.share) == (4, 1, 2, 50.0)
 
 
 @pytest.mark.parametrize(

@@ -35,8 +35,8 @@ def terminal(scores: list[Score], summary: Summary) -> str:
                           said if s.is_true else f"status {s.row.status} is NOT TRUE. {said}"))  # fmt: skip
     sums = (f"{summary.kinds} kinds of fault, {summary.lines} lines, {summary.runs} runs: {summary.runs_met} "
             f"({summary.share:.2f} %) as demanded, of these {summary.runs_by_physics} beyond a limit and as good as "
-            f"physics allows (in {summary.runs_by_effect} the fault had no effect at first); {summary.runs_idle} without "
-            f"effect, not counted; "
+            f"physics allows (in {summary.runs_by_effect} the fault had no effect at first); "
+            f"{summary.runs_idle} without effect, not counted; "
             f"{summary.lines_met} lines met, {summary.lines_by_physics} met with such runs, "
             f"{summary.lines_open} open, {summary.false_trips} false trips")  # fmt: skip
     return (columns(cells) + "\n\n" if len(cells) > 1 else "") + sums

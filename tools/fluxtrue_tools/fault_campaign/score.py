@@ -83,8 +83,9 @@ def _score(row: Row, runs: pd.DataFrame, is_host: bool) -> Score:
         order = told.assign(size=told["beyond_Nm"] + told["detect_ms"].isna() * 1e3)
         first = order.loc[order["size"].idxmax()]
         worst, why = _name(first), str(first["why"])
-    return Score(row, len(runs), int(runs["met"].sum()), len(by_physics),
-                 int((runs["verdict"] == NO_EFFECT).sum()), float(runs["detect_ms"].max()), float(runs["harm_ms"].max()), float(runs["beyond_Nm"].max()), float(runs["current_A"].max()),
+    idle = int((runs["verdict"] == NO_EFFECT).sum())
+    return Score(row, len(runs), int(runs["met"].sum()), len(by_physics), idle, float(runs["detect_ms"].max()),
+                 float(runs["harm_ms"].max()), float(runs["beyond_Nm"].max()), float(runs["current_A"].max()),
                  float(runs["vdc_V"].max()), worst, why, is_host)  # fmt: skip
 
 

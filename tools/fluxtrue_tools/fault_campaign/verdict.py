@@ -135,8 +135,9 @@ def evaluate(row: Row, bounds: Bounded, rated_Nm: float, point: Point, trace: Tr
         verdict, cells, why = run.compared(found, reruns)
     elif reruns is not None and row.must_act and not run.v["first_fault"]:
         verdict = MET if oracle.acts(trace, reruns.healthy()) else NO_EFFECT
+    is_met = verdict in (MET, PHYSICS)
     return {
         "row": row.id, "motor": point.motor, "point": point.index, "sign": point.sign, "speed_rpm": point.speed_rpm,
-        "torque_Nm": point.torque_Nm, **asdict(Verdict(**run.v, verdict=verdict, met=verdict in (MET, PHYSICS), why=why)),
+        "torque_Nm": point.torque_Nm, **asdict(Verdict(**run.v, verdict=verdict, met=is_met, why=why)),
         **cells,
     }  # fmt: skip
