@@ -27,6 +27,33 @@ Processor seconds and memory are those of one run of the proof itself, without i
 """
 
 
+NOT_PROVED: Final = """## What is not proved
+
+No solver finished within seconds for:
+
+- products of two arbitrary words (proved for powers of two instead), `fx` division, square root, sine and cosine;
+- the geometry of the modulation: that three phase voltages of the limited vector do not overflow;
+- the whole step of the arbitration: that it does not overshoot (its rate and its target are proved);
+- values written by XCP, and the set-up of its lists;
+- the torque limits as a whole (each of them is proved).
+
+Not tried: look-ups in the tables, the monitors of the 1 kHz task, the angle tracker, the identification, records of
+more than one piece.
+
+What the properties do not add up to:
+
+- Those of the state machine hold for one step from any content, of the table or of a decision. That they together
+  exclude a wrong sequence of states is not proved but tested (`tests/bus`, `tests/hil`).
+- The safe state without a valid speed: the last one is kept, then it falls after 20,000 steps (`UNKNOWN_STEPS` of
+  `firmware/safety/safe_state.c`), although the rotor may still turn. The proofs hold with that speed, not with the
+  rotor's.
+- What the compiler and the linker make of the source, the ports in `hal/`, and the time that anything takes.
+
+These parts have tests, closed-loop simulations and planted errors instead
+([tests/proof](../../tests/proof/README.md) says what limits a proof).
+"""
+
+
 def write(proofs: Sequence[Proof], verdicts: Mapping[str, Verdict]) -> str:
     """The page."""
     total = sum(verdict.seconds for verdict in verdicts.values())
@@ -43,7 +70,7 @@ def write(proofs: Sequence[Proof], verdicts: Mapping[str, Verdict]) -> str:
                      f"`{proof.planted.file}`", f"{verdict.seconds:.1f}", str(verdict.megabytes)]  # fmt: skip
             text.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
         text.append("")
-    return "\n".join(text)
+    return "\n".join([*text, NOT_PROVED])
 
 
 def timeless(page: str) -> str:
