@@ -190,6 +190,27 @@ def test_the_inverter_tells_the_hash_of_the_dbc_that_was_built_for_it(machine: s
     ecu.close()
 
 
+@pytest.mark.parametrize(("before", "after"), [('(0.1,0) [-1000|1000] "Nm"', '(0.1,0) [-1000|1000] "A"'),
+                                               ('(0.1,0) [-1000|1000] "Nm"', '(0.6,0) [-6000|6000] "Nm"')])  # fmt: skip
+def test_a_request_in_another_unit_is_obeyed_but_told_before_the_drive_is_enabled(before: str, after: str) -> None:
+    """What users of other drives were hurt by: amperes of one version are N·m of the next. No count on the bus shows its
+    unit, so the inverter gives six times the torque; the hash tells the vehicle while nothing is enabled yet."""
+    signal = f" SG_ TorqueRequested : 16|16@1- {before}"
+    assert signal in standard()
+    vehicle = Interface("", standard().replace(signal, signal.replace(before, after)))
+    ecu = Ecu()
+    ecu.run(150)
+    assert ecu.state == "standby"
+    told = {"InterfaceHash": int(ecu.last[CONFIGURATION]["InterfaceHash"].value)}
+    assert "does not describe this inverter" in vehicle.mismatch(told)
+    assert Interface("", standard()).mismatch(told) == ""
+    ecu.power_up(ecu.motor.plant["vdc_V"])
+    meant_Nm = 15.0
+    ecu.run(400, TorqueRequested=6.0 * meant_Nm)
+    assert ecu.truth("torque_mean_Nm") == pytest.approx(6.0 * meant_Nm, rel=0.03)
+    ecu.close()
+
+
 def test_motor_build_writes_the_dbc_and_the_hash(tmp_path: Path) -> None:
     motor = build(ROOT / "tests" / "motors" / "servo", tmp_path, report=False)
     own = read_interface(tmp_path / "fluxtrue.dbc")
