@@ -284,8 +284,8 @@ def test_a_change_of_the_memory_that_nothing_notices_has_no_effect(run: dict[str
     healthy = trace(fault_ms=math.inf, torque=lambda t: np.full(t.shape, 60.0))
     states = States(*[healthy] * 3, healthy=healthy)
     line = row(injection="memory.drive.unused=^1", reaction="bounded", expected="any")
-    judged = evaluate(line, BOUNDS, 132.0, POINT, trace(**run), states.reruns)
-    assert (judged["verdict"], judged["met"]) == (found, found == MET)
+    found_run = evaluate(line, BOUNDS, 132.0, POINT, trace(**run), states.reruns)
+    assert (found_run["verdict"], found_run["met"]) == (found, found == MET)
 
 
 def test_where_no_fault_is_demanded_nothing_needs_to_happen() -> None:
