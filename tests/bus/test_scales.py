@@ -193,8 +193,8 @@ def test_the_inverter_tells_the_hash_of_the_dbc_that_was_built_for_it(machine: s
 @pytest.mark.parametrize(("before", "after"), [('(0.1,0) [-1000|1000] "Nm"', '(0.1,0) [-1000|1000] "A"'),
                                                ('(0.1,0) [-1000|1000] "Nm"', '(0.6,0) [-6000|6000] "Nm"')])  # fmt: skip
 def test_a_request_in_another_unit_is_obeyed_but_told_before_the_drive_is_enabled(before: str, after: str) -> None:
-    """What users of other drives were hurt by: amperes of one version are N·m of the next. No count on the bus shows its
-    unit, so the inverter gives six times the torque; the hash tells the vehicle while nothing is enabled yet."""
+    """What users of other drives were hurt by: amperes of one version are N·m of the next. No count on the bus shows
+    its unit, so the inverter gives six times the torque; the hash tells the vehicle while nothing is enabled yet."""
     signal = f" SG_ TorqueRequested : 16|16@1- {before}"
     assert signal in standard()
     vehicle = Interface("", standard().replace(signal, signal.replace(before, after)))

@@ -294,11 +294,11 @@ def test_where_no_fault_is_demanded_nothing_needs_to_happen() -> None:
         assert evaluate(row(**cells), BOUNDS, 132.0, POINT, steady, States(*[steady] * 3).reruns)["verdict"] == MET
 
 
-def scored(*verdicts: str, status: str = MET) -> Score:
+def scored(*verdicts: str, status: str = MET, is_host: bool = True) -> Score:
     """A line of which each run has one of these verdicts."""
     line = row(injection="memory.drive.unused=^1", status=status)
     runs = [verdict(line, trace()) | {"verdict": each, "met": each in (MET, PHYSICS)} for each in verdicts]
-    return score((line,), pd.DataFrame(runs))[0]
+    return score((line,), pd.DataFrame(runs), is_host)[0]
 
 
 def test_a_line_that_never_has_an_effect_is_open_and_no_status_is_true_of_it() -> None:
@@ -306,6 +306,7 @@ def test_a_line_that_never_has_an_effect_is_open_and_no_status_is_true_of_it() -
         never = scored(NO_EFFECT, NO_EFFECT, status=status)
         assert (never.status, never.is_true) == (OPEN, False)
         assert "WITHOUT EFFECT" in never.result
+    assert scored(NO_EFFECT, NO_EFFECT, is_host=False).is_true
     some = scored(MET, NO_EFFECT, NO_EFFECT)
     assert (some.status, some.is_true, some.met, some.idle) == (MET, True, 1, 2)
     assert "2 of 3 runs without effect" in some.result
