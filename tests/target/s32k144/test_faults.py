@@ -71,6 +71,10 @@ PLANTED_ERRORS: dict[str, tuple[Callable[[Parts], None], PlantedError]] = {
         checks.a_winding_at_the_end_of_its_line_trips,
         PlantedError("ntc.c", "count < node[NODES - 1]", "count < node[19]"),
     ),
+    "the inverter's thermistor is read from the winding's channel": (
+        checks.an_inverter_at_the_end_of_its_line_trips,
+        PlantedError("temperature.c", "ntc_dC(sampling_inverter())", "ntc_dC(sampling_winding())"),
+    ),
     "the bandgap is not read": (
         checks.a_wrong_reference_of_the_converters_is_found,
         PlantedError("sampling.c", "reference_permille((uint16_t)ADC1->R[KNOWN])", "1000"),
