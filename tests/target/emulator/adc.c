@@ -3,6 +3,10 @@
  * change once per PWM period, at its start, but for those of an analogue angle sensor (analogue.c). A conversion takes
  * SMPLTS + 1 + 30 converter clocks, about as long as in the data sheet.
  *
+ * How long a calibration takes is not known. The manuals of the sister family Kinetis say, from memory, as many as
+ * 14,000 converter clocks (and 100 of the bus, which are left out). Seven values with an average of 32 conversions
+ * each would be 9,632. The longer one is used.
+ *
  * documented behaviour                               | modelled | test
  * -------------------------------------------------- | -------- | --------------------------------------------
  * a trigger converts the input of SC1n into Rn       | yes      | test_back_to_back_conversions_follow_at_once
@@ -13,6 +17,8 @@
  * ADCH 31: no conversion                             | yes      | test_the_disabled_input_is_not_converted
  * a trigger during a conversion is ignored           | yes      | test_a_trigger_during_a_conversion_is_ignored
  * calibration before use, and its conditions         | refused  | test_what_is_not_modelled_is_an_error
+ * CAL is set for as long as a calibration takes      | yes      | test_a_calibration_takes_its_time
+ * a register written during a calibration            | refused  | test_a_write_during_a_calibration_is_refused
  * shortest sample time, fastest clock                | refused  | test_what_is_not_modelled_is_an_error
  * 8 and 10 bits                                      | refused  | test_other_resolutions_are_refused
  * comparison, DMA                                    | refused  | test_other_converter_modes_are_refused
@@ -37,6 +43,9 @@ enum {
     AIEN = 0x40,
     OFF = 31,
     CONVERSION = 30,
+    CALIBRATION = 14000,
+    CALIBRATING = 100, /* in place of a conversion's number */
+    CAL = 0x80,
     ADC0_IRQ = 39,
     ADC1_IRQ = 40,
 };
@@ -126,17 +135,28 @@ static void calibrate(emu_t *emu, const peripheral_t *self)
     } else if (!clear) {
         emu_fail(emu, "write of %s.SC3: calibration requires CLPS ... CLP9 to be 0", self->name);
     }
+    adc_t *a = &emu->s.adc[self->instance];
+    a->current = CALIBRATING;
+    a->done = emu_instant(emu) + (uint64_t)CALIBRATION * clock;
+    emu_timer(emu, self->instance == 0 ? TIMER_ADC0 : TIMER_ADC1, a->done);
+}
+
+static void calibration_end(emu_t *emu, const peripheral_t *self)
+{
+    emu->s.adc[self->instance].current = 0;
     emu->s.adc[self->instance].calibrated = true;
-    bus_put(emu, self, SC3, bus_get(emu, self, SC3) & ~0x80U);
+    bus_put(emu, self, SC3, bus_get(emu, self, SC3) & ~(uint32_t)CAL);
     bus_put(emu, self, SC1, bus_get(emu, self, SC1) | COCO);
 }
 
 void adc_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
 {
     (void)old;
-    if (offset == SC2 && (value & 0x3CU) != 0) {
+    if (emu->s.adc[self->instance].current == CALIBRATING) {
+        emu_fail(emu, "write of %s offset 0x%x while it calibrates", self->name, offset);
+    } else if (offset == SC2 && (value & 0x3CU) != 0) {
         emu_fail(emu, "write of %s.SC2: comparison and DMA are not modelled", self->name);
-    } else if (offset == SC3 && (value & 0x80U) != 0) {
+    } else if (offset == SC3 && (value & CAL) != 0) {
         calibrate(emu, self);
     } else if (offset <= SC1_LAST) {
         bus_put(emu, self, offset, value & (AIEN | 31U)); /* clears COCO */
@@ -160,6 +180,10 @@ void adc_fire(emu_t *emu, int instance)
 {
     const peripheral_t *self = of(instance);
     adc_t *a = &emu->s.adc[instance];
+    if (a->current == CALIBRATING) {
+        calibration_end(emu, self);
+        return;
+    }
     const int channel = a->current - 1;
     const uint32_t control = 4U * (uint32_t)channel;
     const uint32_t input = bus_get(emu, self, control) & 31U;

@@ -141,6 +141,12 @@ static bool clocked(const emu_t *emu, const peripheral_t *peripheral)
     return peripheral->gate == 0 || (bus_get(emu, PERIPHERAL(PCC), peripheral->gate) & cgc) != 0;
 }
 
+bool bus_unclocked(const emu_t *emu, uint32_t address)
+{
+    const int p = (address >> 20) == 0x400U ? emu->page[address / PAGE & 0xFFU] : -1;
+    return p >= 0 && !clocked(emu, &peripherals[p]);
+}
+
 /* False: the access is refused, and the emulation stops with the reason. */
 static bool find(emu_t *emu, int p, uint32_t address, uint32_t size, const char *what, place_t *place)
 {

@@ -300,12 +300,15 @@ static bool on_refused(uc_engine *uc, uc_mem_type type, uint64_t address, int si
     const bool write = type == UC_MEM_WRITE_UNMAPPED || type == UC_MEM_WRITE_PROT;
     if (!fetch && is_peripheral(address)) {
         it_state_clear(uc);
-        return true;
+        return !(emu->takes_faults && bus_unclocked(emu, (uint32_t)address) && fault_data(emu, (uint32_t)address));
     }
     if (emu->s.upper_retained && address - RAM_UPPER < RAM_UPPER_SIZE) {
         /* The reference manual forbids every access to RAM whose content is retained. */
         emu_fail(emu, "access to 0x%08x: SIM.CHIPCTL.SRAMU_RETEN keeps this RAM from being accessed",
                  (uint32_t)address);
+        return false;
+    }
+    if (fetch ? fault_fetch(emu, is_peripheral(address)) : fault_data(emu, (uint32_t)address)) {
         return false;
     }
     const char *what = fetch ? "fetch" : write ? "write" : "read";
@@ -326,13 +329,15 @@ void emu_upper_ram_update(emu_t *emu)
     }
 }
 
-enum { EXCEPTION_EXIT = 8 };
+enum { PREFETCH_ABORT = 3, EXCEPTION_EXIT = 8 };
 
 static void on_exception(uc_engine *uc, uint32_t number, void *user)
 {
     emu_t *emu = user;
     if (number == EXCEPTION_EXIT) {
         emu->s.exc_return = emu_pc(emu) | 1U;
+        (void)uc_emu_stop(uc);
+    } else if (number == PREFETCH_ABORT && fault_fetch(emu, is_peripheral(emu_pc(emu)))) {
         (void)uc_emu_stop(uc);
     } else {
         emu_fail(emu, "the core raised exception %u (undefined instruction, SVC or breakpoint)", number);
@@ -353,6 +358,9 @@ static void run_core(emu_t *emu)
     s->exc_return = 0;
     const uc_err code = uc_emu_start(emu->uc, s->pc | 1U, NO_ADDRESS, 0, 0);
     s->pc = emu_pc(emu);
+    if (fault_take(emu, code)) {
+        return;
+    }
     if (code != UC_ERR_OK) {
         emu_fail(emu, "the core stopped: %s", uc_strerror(code));
     } else if (s->exc_return != 0) {

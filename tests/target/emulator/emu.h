@@ -6,8 +6,9 @@
  * the emulation, not a measurement), and from event to event of the peripherals while the core sleeps.
  * Source   docs/howto/emulate.md
  * Units    time in ticks of 1/3.36 GHz: every clock of the chip is a whole number of them
- * Errors   an access to a register that is not modelled or not clocked, a reserved bit, a fault of the core: the
- *          emulation stops, emu_error() names peripheral, register, offset and program counter
+ * Errors   an access to a register that is not modelled or not clocked, a reserved bit, a fault of the core unless
+ *          emu_core_faults() asks for it: the emulation stops, emu_error() names peripheral, register, offset and
+ *          program counter
  * Context  host; any number of instances, one thread per instance at a time */
 #include <stdbool.h>
 #include <stddef.h>
@@ -76,6 +77,9 @@ EMU_API emu_setting_t emu_analogue_set(emu_t *emu, const char *name, double valu
 EMU_API void emu_bridge(const emu_t *emu, emu_bridge_t *bridge);
 EMU_API uint32_t emu_outputs(const emu_t *emu);
 EMU_API void emu_core_state(emu_t *emu, emu_core_state_t state);
+/** Whether a fault of the core is an exception, as on the chip; from creation on it ends the emulation. Outlasts a
+ * reset. */
+EMU_API void emu_core_faults(emu_t *emu, bool taken);
 /** State of a line of port C to the board: driven high or low; released while it is no output, as after a reset. */
 typedef enum { EMU_LINE_RELEASED = 0, EMU_LINE_LOW = 1, EMU_LINE_HIGH = 2 } emu_line_t;
 EMU_API emu_line_t emu_line(const emu_t *emu, unsigned line);

@@ -70,6 +70,8 @@ typedef struct {
     uint32_t systick_csr, systick_rvr;
     uint64_t systick_start;
     bool sleeping;
+    int fault; /* vector of the fault that the instruction has caused, 0: none */
+    uint32_t fault_pc, cfsr, hfsr, bfar;
 } nvic_t;
 
 typedef struct {
@@ -255,6 +257,7 @@ struct emu {
     can_port_t *can_port;
     emu_counts_t counts[VECTORS];
     profile_t *profile; /* NULL: not requested */
+    bool takes_faults;  /* a fault of the core is an exception, not the end of the emulation */
     bool data_watched;  /* on_data() of core.c is called */
     bool upper_closed;  /* unicorn refuses access to the upper RAM, as s.upper_retained demands */
     char error[ERROR_SIZE];
@@ -343,6 +346,8 @@ void bus_reset(emu_t *emu);
 uint32_t bus_get(const emu_t *emu, const peripheral_t *peripheral, uint32_t offset);
 void bus_put(emu_t *emu, const peripheral_t *peripheral, uint32_t offset, uint32_t value);
 
+/** Whether the address belongs to a peripheral whose clock is off. */
+bool bus_unclocked(const emu_t *emu, uint32_t address);
 uint64_t bus_read(uc_engine *uc, uint64_t offset, unsigned size, void *user);
 void bus_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t value, void *user);
 bool bus_private_read(emu_t *emu, uint32_t address, unsigned size, uint64_t *value);
@@ -355,10 +360,19 @@ void nvic_pend(emu_t *emu, int vector);
 void nvic_reconsider(emu_t *emu);
 bool nvic_take(emu_t *emu);
 void nvic_return(emu_t *emu);
+/** A fault of the code that runs; vector: 4 memory, 5 bus, 6 usage. */
+void nvic_fault(emu_t *emu, int vector);
 uint64_t scs_read(uc_engine *uc, uint64_t offset, unsigned size, void *user);
 void scs_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t value, void *user);
 void systick_fire(emu_t *emu);
 int nvic_best(const emu_t *emu);
+
+/* faults.c */
+/** A fault by the instruction that runs: an access to data, a fetch. False: faults end the emulation. */
+bool fault_data(emu_t *emu, uint32_t address);
+bool fault_fetch(emu_t *emu, bool never_executable);
+/** After unicorn has stopped: enters the exception of the fault; false: there was none. */
+bool fault_take(emu_t *emu, uc_err code);
 
 /* profile.c, while emu->profile is not NULL */
 void profile_stop(emu_t *emu);

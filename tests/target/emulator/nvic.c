@@ -10,7 +10,8 @@
  * an active level pends again after the return     | yes      | test_a_level_that_stays_active_interrupts_again
  * sleep, wake-up                                   | yes      | test_a_sleeping_core_is_woken_by_each_tick
  * a vector without a handler                       | refused  | test_what_is_not_modelled_is_an_error
- * MPU, faults as exceptions                        | refused  | test_what_is_not_modelled_is_an_error
+ * MPU                                              | refused  | test_what_is_not_modelled_is_an_error
+ * faults as exceptions: faults.c                   | yes      | test_a_core_fault_is_an_exception
  * an interrupt within an IT block: taken after it  | yes      | test_an_interrupt_at_any_instruction_changes_no_result
  * lazy stacking, tail-chaining, late arrival       | no       | -
  */
@@ -21,6 +22,7 @@
 enum {
     NMI = 2,
     HARD_FAULT = 3,
+    MEMORY_FAULT = 4,
     SYSTICK = 15,
     FRAME_WORDS = 8,
     EXTENDED_WORDS = 26,
@@ -31,6 +33,9 @@ enum {
     LOWEST = 256,
     XPSR_ALIGNED = 1 << 9,
     XPSR_VECTOR = 0x1FF,
+    STKERR = 1 << 12,  /* of CFSR */
+    FORCED = 1 << 30,  /* of HFSR */
+    LOCK_UP = 0x200,   /* of RCM_SRS */
 };
 
 static const int frame_registers[FRAME_WORDS] = {UC_ARM_REG_R0,  UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3,
@@ -174,11 +179,16 @@ static bool stack_write(emu_t *emu, uint32_t address, const uint32_t *words, uin
     if (emu_memory_write(emu, address, words, 4U * count)) {
         return true;
     }
+    if (emu->takes_faults) {
+        emu->s.nvic.cfsr |= STKERR;
+        return false;
+    }
     emu_fail(emu, "the stack is outside the memory: exception frame at 0x%08x", address);
     return false;
 }
 
-static uint32_t push_frame(emu_t *emu)
+/* The value of EXC_RETURN; stored: whether there was memory for the frame. */
+static uint32_t push_frame(emu_t *emu, bool *stored)
 {
     uint32_t frame[EXTENDED_WORDS] = {0};
     const bool extended = (get(emu, UC_ARM_REG_CONTROL) & FPCA) != 0;
@@ -197,7 +207,7 @@ static uint32_t push_frame(emu_t *emu)
         bottom -= 4U;
         frame[7] |= XPSR_ALIGNED;
     }
-    (void)stack_write(emu, bottom, frame, words);
+    *stored = stack_write(emu, bottom, frame, words);
     put(emu, UC_ARM_REG_SP, bottom);
     return extended ? 0xFFFFFFE1U : 0xFFFFFFF1U;
 }
@@ -245,7 +255,12 @@ static void enter(emu_t *emu, int vector)
         emu_fail(emu, "more than %d exceptions are active", NEST_MAX);
         return;
     }
-    const uint32_t code = push_frame(emu);
+    bool stored;
+    const uint32_t code = push_frame(emu, &stored);
+    if (!stored && vector != NMI && vector != HARD_FAULT) { /* the exception stays pending */
+        vector = HARD_FAULT;
+        n->hfsr |= FORCED;
+    }
     put(emu, UC_ARM_REG_LR, n->nest == 0 ? code | 8U : code);
     put(emu, UC_ARM_REG_CONTROL, 0);
     bit_set(n->pending, vector, false);
@@ -267,6 +282,26 @@ static void enter(emu_t *emu, int vector)
     if (emu->on_exception != NULL) {
         emu->on_exception(emu->on_exception_user, vector, true);
     }
+}
+
+/* At the priority of HardFault or above the core locks up, and the chip resets. */
+void nvic_fault(emu_t *emu, int vector)
+{
+    nvic_t *n = &emu->s.nvic;
+    const int current = masked_priority(emu, active_priority(n));
+    const bool is_enabled = (n->shcsr >> (16 + vector - MEMORY_FAULT) & 1U) != 0U;
+    if (is_enabled && priority_of(n, vector) < current) {
+        enter(emu, vector);
+        return;
+    }
+    n->hfsr |= FORCED;
+    if (current > -1) {
+        enter(emu, HARD_FAULT);
+        return;
+    }
+    emu->s.reset_wanted = true;
+    emu->s.reset_cause = LOCK_UP;
+    emu->s.stop = true;
 }
 
 bool nvic_take(emu_t *emu)

@@ -7,6 +7,7 @@
  * ICSR, AIRCR.PRIGROUP, SHPR                 | yes      | test_qemu_takes_the_same_exceptions
  * SysTick: count flag, reload, interrupt     | yes      | test_qemu_takes_the_same_exceptions
  * AIRCR: reset request with its key          | refused  | test_what_is_not_modelled_is_an_error
+ * CFSR, HFSR, BFAR: cleared by ones           | yes      | test_a_core_fault_is_an_exception
  * DWT: cycle counter                         | no       | -
  * MPU, debug, every other register           | refused  | test_what_is_not_modelled_is_an_error
  */
@@ -37,8 +38,10 @@ enum {
     SHCSR = SCS + 0xD24,
     CFSR = SCS + 0xD28,
     HFSR = SCS + 0xD2C,
+    BFAR = SCS + 0xD38,
     CPACR = SCS + 0xD88,
     STIR = SCS + 0xF00,
+    TRAPS = 1 << 3 | 1 << 4, /* of CCR */
     FPCCR = SCS + 0xF34,
     FPCAR = SCS + 0xF38,
     DEMCR = SCS + 0xDFC,
@@ -187,9 +190,14 @@ static bool system_word(emu_t *emu, uint32_t at, uint32_t *value)
         *value = n->shcsr;
         break;
     case CFSR:
+        *value = n->cfsr;
+        break;
     case HFSR:
-        *value = 0;
-        break; /* always 0, because a fault ends the emulation */
+        *value = n->hfsr;
+        break;
+    case BFAR:
+        *value = n->bfar;
+        break;
     case CPACR:
         *value = n->cpacr;
         break;
@@ -313,13 +321,19 @@ static bool system_store(emu_t *emu, uint32_t at, uint32_t value)
         n->scr = value & 0x16U;
         break;
     case CCR:
+        if ((value & TRAPS) != 0U) {
+            emu_fail(emu, "write of SCB.CCR: traps of divisions by zero and unaligned accesses are not modelled");
+        }
         n->ccr = value;
         break;
     case SHCSR:
         n->shcsr = value;
         break;
-    case CFSR:
+    case CFSR: /* a one clears the flag */
+        n->cfsr &= ~value;
+        break;
     case HFSR:
+        n->hfsr &= ~value;
         break;
     case CPACR:
         n->cpacr = value;

@@ -43,6 +43,9 @@ REFUSED = {
     25: "FTM0 is used, but PORTD.PCR15 does not give it the pin (MUX 2)",
     26: "PTC: line 0 is switched on, but it is an input (PDDR)",
     27: "access to 0x20000800: SIM.CHIPCTL.SRAMU_RETEN keeps this RAM from being accessed",
+    30: "write of SCB.CCR: traps of divisions by zero",
+    31: "the core raised exception 2",
+    32: "the core raised exception 7",
     28: "SCG selects clock source 1, which is off, not valid yet or no whole number of ticks",
 }
 

@@ -12,8 +12,9 @@ from fluxtrue_tools.emulate.core import Core, EmulationStoppedError
 CORE_S = 1 / 48e6  # after reset the core runs from the fast internal clock
 ADC_S = 1 / 12e6
 CONVERSION_S = 43 * ADC_S  # SMPLTS 12: 13 + 30 clocks
+CALIBRATION_S = 14_000 * ADC_S  # assumed, adc.c
 OUTPUT_S = 3 * CORE_S  # pre-trigger two cycles after its cause, trigger one later
-COCO = 0x80
+COCO = CAL = 0x80
 PDB_ON, SOFTWARE, LDOK, SWTRIG, PDBEIE = 0x80, 15 << 8, 1, 1 << 16, 1 << 17
 PDB0_IRQ = 52
 ENABLED = PDB_ON | SOFTWARE
@@ -28,11 +29,38 @@ def core(library: ctypes.CDLL, program: Program) -> Iterator[Core]:
             ("SCG.FIRCDIV", 0x301), ("PCC.PCC_ADC0", 3 << 24), ("PCC.PCC_ADC0", 3 << 24 | 1 << 30),
             ("PCC.PCC_PDB0", 1 << 30), ("ADC0.CFG1", 4), ("ADC0.CFG2", 12),
             *((f"ADC0.{name}", 0) for name in ("CLPS", "CLP3", "CLP2", "CLP1", "CLP0", "CLPX", "CLP9")),
-            ("ADC0.SC3", 0x87), ("ADC0.SC3", 0), ("ADC0.SC2", 0x40),
-            ("ADC0.SC10", 1), ("ADC0.SC11", 2), ("ADC0.SC12", 3),
+            ("ADC0.SC3", 0x87),
+        ):  # fmt: skip
+            core.store(name, value)
+        core.run(CALIBRATION_S)
+        for name, value in (
+            ("ADC0.SC3", 0), ("ADC0.SC2", 0x40), ("ADC0.SC10", 1), ("ADC0.SC11", 2), ("ADC0.SC12", 3),
         ):  # fmt: skip
             core.store(name, value)
         yield core
+
+
+def calibrate_again(core: Core) -> None:
+    core.store("ADC0.SC2", 0)
+    for name in ("CLPS", "CLP3", "CLP2", "CLP1", "CLP0", "CLPX", "CLP9"):
+        core.store(f"ADC0.{name}", 0)
+    core.store("ADC0.SC3", 0x87)
+
+
+def test_a_calibration_takes_its_time(core: Core) -> None:
+    calibrate_again(core)
+    core.run(0.999 * CALIBRATION_S)
+    assert core.load("ADC0.SC3") & CAL
+    core.run(0.002 * CALIBRATION_S)
+    assert core.load("ADC0.SC3") & CAL == 0
+    assert core.load("ADC0.SC10") & COCO
+
+
+@pytest.mark.parametrize("name", ["SC10", "SC2", "SC3", "CFG2"])
+def test_a_write_during_a_calibration_is_refused(core: Core, name: str) -> None:
+    calibrate_again(core)
+    with pytest.raises(EmulationStoppedError, match="while it calibrates"):
+        core.store(f"ADC0.{name}", 0)
 
 
 def arm(core: Core, enabled: int, delayed: int, back_to_back: int, **registers: int) -> None:

@@ -78,6 +78,7 @@ _SIGNATURES = {
     "emu_pins": (ctypes.POINTER(Pins), [_HERE]),
     "emu_outputs": (_U32, [_HERE]),
     "emu_core_state": (None, [_HERE, _INT]),
+    "emu_core_faults": (None, [_HERE, _BOOL]),
     "emu_power_cycle": (None, [_HERE]),
     "emu_reset_now": (None, [_HERE, _U32]),
     "emu_flash_slow": (None, [_HERE, _BOOL]),
@@ -242,6 +243,10 @@ class Core:
     def core_state(self, state: State) -> None:
         """Change the state of the core; timers and peripherals continue."""
         self._library.emu_core_state(self._handle, state.value)
+
+    def take_faults(self, taken: bool = True) -> None:
+        """Let a fault of the core be an exception, as on the chip, instead of the end of the emulation."""
+        self._library.emu_core_faults(self._handle, taken)
 
     def reset(self, cause: int) -> None:
         """Reset the processor now; the bits of RCM_SRS say why. With POR (0x80) the supply has failed."""

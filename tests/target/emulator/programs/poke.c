@@ -92,6 +92,8 @@ __attribute__((used)) void reset(void)
 #endif
 #if CASE != 21
     REG(0x4003B094U) = 0x87U;
+    while ((REG(0x4003B094U) & 0x80U) != 0U) {
+    }
 #endif
     REG(0x4003B044U) = CASE == 20 ? 1U : 12U;
     REG(0x4003B000U) = 0;
@@ -131,6 +133,12 @@ __attribute__((used)) void reset(void)
     seen = REG(0x20000800U);
     REG(0x40048004U) = 0x200000U;
     seen = REG(0x20000804U);
+#elif CASE == 30               /* trap of divisions by zero */
+    REG(0xE000ED14U) = 0x210U;
+#elif CASE == 31
+    __asm__ volatile("svc #0");
+#elif CASE == 32
+    __asm__ volatile("bkpt #0");
 #endif
     for (;;) {
     }
