@@ -8,6 +8,7 @@
  * pended while masked: taken when unmasked         | yes      | test_qemu_takes_the_same_exceptions
  * stacking, alignment, floating-point registers    | yes      | test_exceptions_nest_by_priority
  * an active level pends again after the return     | yes      | test_a_level_that_stays_active_interrupts_again
+ * pending stays although the level has gone        | yes      | test_a_read_before_the_interrupt_loses_no_period
  * sleep, wake-up                                   | yes      | test_a_sleeping_core_is_woken_by_each_tick
  * a vector without a handler                       | refused  | test_what_is_not_modelled_is_an_error
  * MPU                                              | refused  | test_what_is_not_modelled_is_an_error

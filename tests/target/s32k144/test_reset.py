@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Through a reset at 9500 rpm: the short circuit is there again within 2 ms, and the dc link stays below 1.2 of the
-battery's voltage. A slice of the campaign of resets.py, real resets, and planted errors."""
+battery's voltage. A slice of the campaign of resets.py, real resets, and planted errors. The two images whose angle is
+analogue calibrate three times before and do not keep the 2 ms."""
 
 from __future__ import annotations
 
@@ -18,10 +19,11 @@ from planting import PlantedError, assert_found
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.build import Parts
-from fluxtrue_tools.emulate.core import CENTRE, LIMIT, Core
+from fluxtrue_tools.emulate.core import CENTRE, LIMIT, Core, State
 
 POINTS = 10
 WITHOUT_GATES_MS = 2.0
+LATER_MS = {"sincos": 4.4, "windings": 5.4}  # measured: docs/theory/safe-state.md
 STEP_PERIODS = 10  # in 1 ms
 VDC_SHARE = 1.2
 FIRST_WATCHDOG_S = 0.1
@@ -30,6 +32,9 @@ COPY_BYTES = 40
 SRAMU_RETEN = 20  # SIM_CHIPCTL
 SAFE_STATE = 6  # of port C, hal/s32k144/pins.h
 HELD = 0x2A3F  # FTM0.SWOCTRL: the short circuit
+LOWER, NO_OUTPUTS = 0b10_1010, 0
+FILTER_S = 8 / 48e6  # of the fault input: 4 + FFVAL clocks of the internal oscillator
+CLOCK_S = 1 / 48e6
 
 
 @pytest.fixture(scope="module")
@@ -46,13 +51,13 @@ def resolver_parts() -> Parts:
     return build.prepare("hsm1", angle="resolver", flashed=True)
 
 
-def holds(outcome: resets.Outcome) -> None:
+def holds(outcome: resets.Outcome, within_ms: float = WITHOUT_GATES_MS) -> None:
     """The bounds of one reset, with the hardware's path where the processor has nothing that it remembers."""
     assert outcome.vdc_share <= VDC_SHARE, outcome
     if outcome.kind == "power-on":
         assert math.isnan(outcome.without_gates_ms), "the retained RAM is not valid: nothing may be switched on"
     else:
-        assert outcome.without_gates_ms <= WITHOUT_GATES_MS, outcome
+        assert outcome.without_gates_ms <= within_ms, outcome
         assert outcome.held, outcome
 
 
@@ -88,6 +93,45 @@ def test_the_hardware_has_the_bridge_until_the_pwm_runs(parts: Parts) -> None:
 def test_with_a_resolver_too(resolver_parts: Parts) -> None:
     for outcome in resets.campaign(resolver_parts, 5, both=False):
         holds(outcome)
+
+
+@pytest.mark.parametrize("angle", ["as5047", "sincos", "windings"])
+def test_with_the_other_sensors(angle: str) -> None:
+    if not have_arm_compiler():
+        pytest.skip("no cross compiler: there is no image to emulate")
+    for outcome in resets.campaign(build.prepare("hsm1", angle=angle, flashed=True), 2, both=False):
+        print(f"{angle}: {outcome.without_gates_ms:.2f} ms after a reset by {outcome.kind}")
+        holds(outcome, LATER_MS.get(angle, WITHOUT_GATES_MS))
+        # Whoever mends this corrects the documents, too.
+        assert (outcome.without_gates_ms > WITHOUT_GATES_MS) == (angle in LATER_MS)
+
+
+def a_gate_fault_in_the_start_opens_the_bridge(parts: Parts) -> None:
+    """While the short circuit is held and the timer does not count yet: by hardware, whatever the software does."""
+    loop, stand = resets.powered_up(parts)
+    with loop:
+        core = stand.core
+        core.reset(resets.KINDS["watchdog"])
+        while core.register("FTM0.SWOCTRL") != HELD:
+            core.run(2e-6)
+        assert core.outputs == LOWER
+        held = core.save()
+        for state in (State.STUCK, State.RUNS):
+            core.restore(held)
+            core.core_state(state)
+            core.run(1e-4)
+            assert core.outputs == LOWER
+            core.board(gate_fault=True)
+            core.run(FILTER_S + CLOCK_S)
+            assert core.outputs == NO_OUTPUTS
+            core.board()
+            core.run(5e-3)
+            assert core.outputs == NO_OUTPUTS, "the fault has ended; nothing has cleared its latch yet"
+        core.free(held)
+
+
+def test_a_gate_fault_in_the_start_opens_the_bridge(parts: Parts) -> None:
+    a_gate_fault_in_the_start_opens_the_bridge(parts)
 
 
 def test_without_the_hardware_path_a_power_on_reset_exceeds_the_bound(parts: Parts) -> None:
@@ -216,6 +260,10 @@ PLANTED_ERRORS: dict[str, tuple[Callable[[Parts], None], PlantedError]] = {
     "the timer is set up again": (
         four_resets_stay_within_the_bounds,
         PlantedError("main.c", "    if (!holds) {\n", "    if (!holds || holds) {\n"),
+    ),
+    "the fault input is not set up before the short circuit": (
+        a_gate_fault_in_the_start_opens_the_bridge,
+        PlantedError("pwm.c", "    configure_faults();\n", "    (void)configure_faults;\n"),
     ),
     "the state machine starts anew": (
         four_resets_stay_within_the_bounds,
