@@ -58,7 +58,7 @@ def test_an_enabled_fault_has_its_own_exception(library: ctypes.CDLL, program: P
     assert (vector, cause, forced) == (OWN[case], CAUSES[case][0], 0)
 
 
-def test_a_fault_that_its_own_exception_cannot_take_is_a_hard_fault(library: ctypes.CDLL, program: Program) -> None:
+def test_a_fault_that_its_own_exception_cannot_take(library: ctypes.CDLL, program: Program) -> None:
     """PRIMASK masks the fault's own exception, whose priority is 0, and not HardFault."""
     masked = program("core_faults", "-DCASE=6", ENABLE_ALL, '-DBEFORE="cpsid i"')
     vector, cause, forced, _, _ = seen(library, masked)

@@ -3,8 +3,8 @@
 
 In the fast ISR and in the task, after which the short circuit is there again within 2 ms; and in three places of the
 start after a reset, after which the bridge is the board's: the copies of the state do not outlast a second reset before
-the task has written them. The clock of a converter that is lost is a bus fault; elsewhere an undefined instruction takes
-the place of a function's first one until the core has faulted.
+the task has written them. The clock of a converter that is lost is a bus fault; elsewhere an undefined instruction
+takes the place of a function's first one until the core has faulted.
 """
 
 from __future__ import annotations
