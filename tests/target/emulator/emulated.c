@@ -262,6 +262,7 @@ double emulated_get(emulated_t *e, const char *name)
         {"emulator.processor_C", e->processor_C},
         {"emulator.board", e->board},
         {"emulator.gates", bridge.gates},
+        {"emulator.gate_supply", emu_gate_driver(e->emu)},
         {"emulator.reset_share", e->reset_share},
         {"emulator.safe_state", emu_safe_state_requested(e->emu)},
         {"emulator.dead_time_s", bridge.dead_time_s},

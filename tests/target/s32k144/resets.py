@@ -44,7 +44,7 @@ MAIN_CONTACTOR = 1  # of port C, hal/s32k144/pins.h
 @dataclass(frozen=True)
 class Outcome:
     """A reset. without_gates_ms: until the short circuit; NaN: the processor does not apply it. held: from
-    then on without interruption, and with the contactor closed, for 0.1 s."""
+    then on without interruption, with the supply of the gates, for 0.1 s, and with the contactor closed at its end."""
 
     kind: str
     torque_Nm: float
@@ -81,14 +81,15 @@ def reset(loop: Loop, stand: Stand, kind: str, torque: float, share: float, hard
     """One reset, and the time after it."""
     if not hardware:
         loop.set("plant.hardware_safe_V", 0.0)
-    loop.record(("truth.vdc_V", "emulator.gates", "truth.i_d_A", "truth.i_q_A"), 1)
+    loop.record(("truth.vdc_V", "emulator.gates", "truth.i_d_A", "truth.i_q_A", "emulator.gate_supply"), 1)
     loop.set("emulator.reset_share", share)
     loop.set("emulator.reset", KINDS[kind])
     rows = [row for _ in range(AFTER_PERIODS // stand.periods_per_ms) for row in stand.run_ms()]
     gates = [row[1] for row in rows]
     without = (gates.index(1.0) + 1 - share) * 0.1 if 1.0 in gates else float("nan")
     contactor = stand.core.register("PTC.PDOR") >> MAIN_CONTACTOR & 1 == 1
-    held = contactor and 1.0 in gates and 0.0 not in gates[gates.index(1.0) :]
+    after = rows[gates.index(1.0) :] if 1.0 in gates else []
+    held = contactor and bool(after) and all(row[1] == 1.0 and row[4] == 1.0 for row in after)
     peak = max((row[2] ** 2 + row[3] ** 2) ** 0.5 for row in rows)
     return Outcome(kind, torque, share, hardware, max(row[0] for row in rows) / BATTERY_V, without, held, peak)
 
