@@ -9,7 +9,7 @@
  * IMPRECISERR. That a failed stacking on the entry of HardFault leaves its handler to run is from memory.
  *
  * documented behaviour                               | modelled | test
- * -------------------------------------------------- | -------- | ------------------------------------------------------
+ * -------------------------------------------------- | -------- | ----------------------------------------------------
  * access to no memory, write of flash: bus fault     | yes      | test_a_core_fault_is_an_exception
  * access to a peripheral without its clock: the same | yes      | test_a_core_fault_is_an_exception
  * fetch from a peripheral's address: memory fault    | yes      | test_a_core_fault_is_an_exception

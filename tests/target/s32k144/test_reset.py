@@ -102,7 +102,7 @@ def test_with_the_other_sensors(angle: str) -> None:
     for outcome in resets.campaign(build.prepare("hsm1", angle=angle, flashed=True), 2, both=False):
         print(f"{angle}: {outcome.without_gates_ms:.2f} ms after a reset by {outcome.kind}")
         holds(outcome, LATER_MS.get(angle, WITHOUT_GATES_MS))
-        # Whoever mends this corrects the documents, too.
+        # If this is mended, the documents must be corrected, too.
         assert (outcome.without_gates_ms > WITHOUT_GATES_MS) == (angle in LATER_MS)
 
 
