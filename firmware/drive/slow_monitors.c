@@ -152,6 +152,7 @@ static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool ac
         .i_ref = task->i_ref,
         .psi_ref = task->psi_ref,
         .theta_e = snapshot->window.last.theta,
+        .r = torque_monitor_resistance(&drive->motor->torque_monitor, snapshot->winding_dC),
     };
     return launch_power_step(&drive->motor->launch_power, &task->launch_power, &in);
 }

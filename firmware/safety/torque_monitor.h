@@ -61,6 +61,12 @@ typedef struct {
     q15_t current;      /* magnitude of i */
 } torque_monitor_in_t;
 
+/** Resistance and its largest error, at the winding's temperature if that is known (MN-32). */
+typedef struct {
+    q16_t r, error;
+} winding_resistance_t;
+
+winding_resistance_t torque_monitor_resistance(const torque_monitor_config_t *config, int16_t winding_dC);
 /** Lag of the tracked speed behind the rotor's beyond the apparent lag that one count of the sensor causes, else 0
  * (MN-41). Before torque_monitor_step() with the same speed. */
 q15_t torque_monitor_lag(const torque_monitor_config_t *config, const torque_monitor_state_t *state, q15_t tracked);
