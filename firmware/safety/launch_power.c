@@ -99,19 +99,25 @@ static bool is_vague(const launch_power_state_t *state, int32_t loss_max)
     return state->first_noise_q8 > fx_max_s32(2 * state->noise_q8, VAGUE_Q8 * loss_max);
 }
 
-/* True if the means begin anew. A reference that moves slowly is followed. */
-static bool begins_anew(const launch_power_config_t *config, launch_power_state_t *state, const launch_power_in_t *in)
+/* A reference that has moved slowly, with enough current before to be followed. */
+static bool can_follow(const launch_power_config_t *config, const launch_power_state_t *state, q15_t before,
+                       int32_t way)
 {
-    const q15_t before = fx_magnitude(state->i_ref.d, state->i_ref.q);
+    return way > config->i_0 && way <= 2 * config->i_0 && state->since >= SLOW_STEPS && before > config->i_min;
+}
+
+/* True if the means begin anew. before: the current at the last movement. */
+static bool begins_anew(const launch_power_config_t *config, launch_power_state_t *state, const launch_power_in_t *in,
+                        q15_t before, int32_t loss_max)
+{
     const int32_t way = moved_by(state, in);
     const bool moved = way > config->i_0;
-    const bool vague = state->since == STANDING_STEPS && is_vague(state, times(config->v_1, before));
-    const bool slow = state->since >= SLOW_STEPS && way <= 2 * config->i_0;
+    const bool vague = state->since == STANDING_STEPS && is_vague(state, loss_max);
+    const bool follows = can_follow(config, state, before, way);
     state->since = (moved || vague) ? 1U : (uint8_t)fx_min_s32(state->since + 1, STANDING_STEPS);
     if (vague || in->behind || has_turned(state, in)) {
         return true;
     }
-    const bool follows = moved && slow && before > config->i_min;
     if (follows) {
         follow_reference(config, state, in, before);
     }
@@ -121,7 +127,9 @@ static bool begins_anew(const launch_power_config_t *config, launch_power_state_
 /* True while there is a power to compare with. */
 static bool update_means(const launch_power_config_t *config, launch_power_state_t *state, const launch_power_in_t *in)
 {
-    const bool anew = begins_anew(config, state, in);
+    const q15_t before = fx_magnitude(state->i_ref.d, state->i_ref.q);
+    const int32_t loss_max = times(config->v_1, before);
+    const bool anew = begins_anew(config, state, in, before, loss_max);
     const int32_t omega = fx_mulhi((int32_t)(in->theta_e - state->theta_e), config->turn_gain);
     state->theta_e = in->theta_e;
     if (anew) {
@@ -131,7 +139,6 @@ static bool update_means(const launch_power_config_t *config, launch_power_state
     }
     const int shift = (state->steady < MOVING_STEPS) ? 0 : MEAN_SHIFT;
     const int32_t power = other_power(in, omega);
-    const int32_t loss_max = times(config->v_1, fx_magnitude(state->i_ref.d, state->i_ref.q));
     update_noise(config, state, power, loss_max);
     state->power_q8 = mean_step(state->power_q8, power * 256, shift);
     state->omega_q8 = mean_step(state->omega_q8, omega * 256, shift);

@@ -25,7 +25,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "safety/torque_monitor.h"
+#include "safety/winding_types.h"
 #include "types/frames.h"
 
 typedef struct {

@@ -48,7 +48,6 @@ static q31_t resistance_at(const torque_monitor_config_t *config, int32_t dC)
     return config->r + config->r_per_dC * (dC - 200); /* 20 C */
 }
 
-/* (MN-32). A reading beyond the range of the winding's temperature counts as the end of the range. */
 winding_resistance_t torque_monitor_resistance(const torque_monitor_config_t *config, int16_t winding_dC)
 {
     const int32_t min_dC = config->winding_min_dC, max_dC = config->winding_max_dC;
@@ -139,9 +138,7 @@ uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monit
         return 0;
     }
     const dq_q15_t rate = flux_rate(config, state, in->psi);
-    const machine_t now = {.speed = follow_speed(config, state, in->omega),
-                           .r = torque_monitor_resistance(config, in->winding_dC),
-                           .current = in->current};
+    const machine_t now = {.speed = follow_speed(config, state, in->omega), .r = in->r, .current = in->current};
     const dq_q15_t psi_mean = {(in->psi.d + state->psi.d) / 2, (in->psi.q + state->psi.q) / 2};
     state->psi = in->psi;
     state->omega = in->omega;

@@ -387,8 +387,7 @@ typedef struct {
 static double first_steps(const twin_t *t, double i)
 {
     const double beyond = 2.0 * t->r - 530.0 * i / 65536.0;
-    const int32_t loss_max = fx_mulhi(530, fx_magnitude(state.i_ref.d, state.i_ref.q) * 65536);
-    const double of_code = 2 * (state.noise_q8 >> 8) - loss_max;
+    const double of_code = 2 * (state.noise_q8 >> 8) - fx_mulhi(530, (int32_t)lround(i) * 65536);
     return (t->steady < SETTLED + EARLY && ((fabs(beyond) > 20.0) ? beyond : of_code) > 0.0) ? 8.0 : 4096.0;
 }
 
@@ -455,13 +454,15 @@ static bool begins_anew(twin_t *t, bool turned)
 static double twin_step(twin_t *t)
 {
     const double i_d = in.i_ref.d, i_q = in.i_ref.q, change = (double)(int32_t)(in.theta_e - (uint32_t)t->theta);
+    const double before = hypot(t->i_d, t->i_q);
     const bool moved = begins_anew(t, fabs(change) > 67108864.0);
+    const double i = moved ? hypot(i_d, i_q) : before; /* of the last movement before this step */
     const double w = moved ? 0.0 : change * 623900.0 / 4294967296.0;
     const double torque = (in.psi_ref.d * i_q - in.psi_ref.q * i_d) / 32768.0;
     const double p = (in.u_standing.d * i_d + in.u_standing.q * i_q - w * torque) / 65536.0;
     t->theta = in.theta_e;
-    follow_noise(t, p, hypot(i_d, i_q));
-    const double steps = first_steps(t, hypot(i_d, i_q));
+    follow_noise(t, p, i);
+    const double steps = first_steps(t, i);
     follow(t, &t->p, &t->p_0, p, steps);
     follow(t, &t->w, &t->w_0, w, steps);
     const double v_turning = 2.0 * fabs(t->w - t->w_0) * (2884.0 + abs(in.psi_ref.q) / 8.0) / 65536.0;
