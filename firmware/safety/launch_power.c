@@ -41,14 +41,14 @@ static int32_t moved_by(const launch_power_state_t *state, const launch_power_in
 /* The loss of the sum of a step in a resistance, for a product of currents in q30; Q8. */
 static int32_t loss_q8(const launch_power_config_t *config, q16_t r, int32_t i_squared)
 {
-    return (fx_mulhi(r * 16384, i_squared) >> 6) * config->periods;
+    return (fx_mulhi(r * 16384, i_squared) >> 6) * (int32_t)config->periods;
 }
 
 /* (MN-57): the legs keep their voltage, so that m_0 is in proportion to the current but for the resistance. */
 static void follow_reference(const launch_power_config_t *config, launch_power_state_t *state,
                              const launch_power_in_t *in, q15_t before)
 {
-    const q15_t now = fx_magnitude(in->i_ref.d, in->i_ref.q);
+    const int32_t now = fx_magnitude(in->i_ref.d, in->i_ref.q);
     const int32_t change = now - before;
     const int32_t share = change * 32768 / before;
     const int32_t doubt = (loss_q8(config, in->r.error, now * fx_abs_q31(change)) >> 8) +

@@ -59,7 +59,7 @@ typedef struct {
     q15_t omega;        /* tracked: lags behind the rotor */
     q15_t torque;       /* commanded, as the closed loop follows it */
     winding_resistance_t r;
-    q15_t current;      /* magnitude of i */
+    q15_t current; /* magnitude of i */
 } torque_monitor_in_t;
 
 /** (MN-32); a reading beyond the range of the winding's temperature counts as the end of the range. */

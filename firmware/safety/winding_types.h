@@ -9,7 +9,7 @@
  * Context  values only */
 #include "fx/q.h"
 
-/** Resistance at the winding's temperature, or in the middle of its range if that is not known, and its largest error. */
+/** Resistance at the winding's temperature, or in the middle of its range where that is unknown; its largest error. */
 typedef struct {
     q16_t r, error;
 } winding_resistance_t;

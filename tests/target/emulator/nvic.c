@@ -34,9 +34,9 @@ enum {
     LOWEST = 256,
     XPSR_ALIGNED = 1 << 9,
     XPSR_VECTOR = 0x1FF,
-    STKERR = 1 << 12,  /* of CFSR */
-    FORCED = 1 << 30,  /* of HFSR */
-    LOCK_UP = 0x200,   /* of RCM_SRS */
+    STKERR = 1 << 12, /* of CFSR */
+    FORCED = 1 << 30, /* of HFSR */
+    LOCK_UP = 0x200,  /* of RCM_SRS */
 };
 
 static const int frame_registers[FRAME_WORDS] = {UC_ARM_REG_R0,  UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3,
@@ -252,7 +252,7 @@ static void enter(emu_t *emu, int vector)
     if (unsupported(emu)) {
         return;
     }
-    if (n->nest == NEST_MAX) {
+    if (n->nest < 0 || n->nest >= NEST_MAX) {
         emu_fail(emu, "more than %d exceptions are active", NEST_MAX);
         return;
     }
