@@ -65,7 +65,7 @@ typedef struct {
     uint8_t active[NEST_MAX];
     uint64_t spent[NEST_MAX]; /* instructions of each active handler so far */
     uint64_t resumed;         /* count of instructions when the innermost handler began or was resumed */
-    int nest;
+    uint32_t nest;
     uint32_t vtor, aircr, scr, ccr, cpacr, fpccr, fpcar, shcsr, demcr, dwt_ctrl, cyccnt_offset;
     uint32_t systick_csr, systick_rvr;
     uint64_t systick_start;

@@ -115,7 +115,7 @@ static int first_pending(const nvic_t *n)
 static int active_priority(const nvic_t *n)
 {
     int lowest = LOWEST;
-    for (int i = 0; i < n->nest; i++) {
+    for (uint32_t i = 0; i < n->nest; i++) {
         const int priority = priority_of(n, n->active[i]);
         lowest = priority < lowest ? priority : lowest;
     }
@@ -252,7 +252,7 @@ static void enter(emu_t *emu, int vector)
     if (unsupported(emu)) {
         return;
     }
-    if (n->nest < 0 || n->nest >= NEST_MAX) {
+    if (n->nest >= NEST_MAX) {
         emu_fail(emu, "more than %d exceptions are active", NEST_MAX);
         return;
     }
@@ -346,8 +346,8 @@ void nvic_return(emu_t *emu)
 {
     nvic_t *n = &emu->s.nvic;
     const uint32_t code = emu->s.exc_return;
-    if (n->nest <= 0 || (code & 0xFFFFFFE7U) != 0xFFFFFFE1U || ((code & 8U) != 0) != (n->nest == 1)) {
-        emu_fail(emu, "0x%08x is no valid exception return with %d exceptions active", code, n->nest);
+    if (n->nest == 0 || (code & 0xFFFFFFE7U) != 0xFFFFFFE1U || ((code & 8U) != 0) != (n->nest == 1)) {
+        emu_fail(emu, "0x%08x is no valid exception return with %u exceptions active", code, n->nest);
         return;
     }
     account(emu);

@@ -38,7 +38,7 @@ bool emu_profile_start(emu_t *emu, const uint8_t *cost, uint32_t half_words, uin
     }
     memcpy(emu->profile->cost, cost, half_words);
     emu->profile->taken = taken;
-    emu->profile->depth = emu->s.nvic.nest;
+    emu->profile->depth = (int)emu->s.nvic.nest;
     return true;
 }
 

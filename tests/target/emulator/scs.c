@@ -83,7 +83,7 @@ static void change(uint32_t *set, uint32_t word, uint32_t bits, bool on)
 static uint32_t active_word(const nvic_t *n, uint32_t word)
 {
     uint32_t bits = 0;
-    for (int i = 0; i < n->nest; i++) {
+    for (uint32_t i = 0; i < n->nest; i++) {
         const uint32_t interrupt = n->active[i] - 16U;
         bits |= n->active[i] >= 16U && interrupt / 32U == word ? 1U << (interrupt % 32U) : 0U;
     }
