@@ -2,6 +2,7 @@
 #include "fx/q.h"
 #include "fx/vec.h"
 #include "safety/launch_power.h"
+#include "signal/mean.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -576,6 +577,94 @@ void test_the_error_of_the_tables_is_added_to_the_threshold(void)
         expect_wrong(beyond, (launch_power_state_t){.steady = SETTLED + EARLY,
                                                     .first_omega_q8 = -2310 * 256,
                                                     .first_power_q8 = -(147 + beyond) * 256 - 50});
+    }
+}
+
+/* A state in which nothing but the reference has moved since so many steps. */
+static launch_power_state_t standing(int32_t i_q, uint8_t since)
+{
+    return (launch_power_state_t){.steady = SETTLED + EARLY, .i_ref = {0, (q15_t)i_q}, .since = since};
+}
+
+/* (MN-57) in integers, products half up. */
+static int64_t product_of(int64_t a, int64_t b, int shift)
+{
+    return (a * b + (1LL << (shift - 1))) >> shift;
+}
+
+static int64_t loss_q8(q16_t r, int64_t product)
+{
+    return (product_of((int64_t)r * 16384, product, 32) >> 6) * PERIODS;
+}
+
+void test_a_slow_movement_takes_both_references_with_it(void)
+{
+    static const int32_t to[] = {20354, 19701};
+    for (int k = 0; k < 2; k++) {
+        const int64_t change = to[k] - 20000, share = change * 32768 / 20000;
+        const int64_t doubt = (loss_q8(1993, to[k] * llabs(change)) >> 8) + product_of(530, llabs(change), 16);
+        launch_power_state_t expected = standing(to[k], 1);
+        state = standing(20000, 4);
+        state.first_power_q8 = 150000000;
+        state.first_noise_q8 = 4000000;
+        in.i_ref = (dq_q15_t){0, to[k]};
+        in.r = (winding_resistance_t){.r = 15943, .error = 1993};
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+        expected.first_power_q8 =
+            (int32_t)(150000000 + 2 * product_of(150000000, share, 16) + loss_q8(15943, to[k] * change));
+        expected.first_noise_q8 = (int32_t)(4000000 + 2 * product_of(4000000, share, 16) + 181 * doubt);
+        TEST_ASSERT_EQUAL_INT32(mean_step(expected.first_power_q8, state.power_q8, 12), state.first_power_q8);
+        TEST_ASSERT_EQUAL_INT32(mean_step(expected.first_noise_q8, state.noise_q8, 12), state.first_noise_q8);
+        TEST_ASSERT_EQUAL_UINT8(expected.since, state.since);
+        TEST_ASSERT_EQUAL_INT16(to[k], state.i_ref.q);
+    }
+}
+
+void test_the_doubt_of_a_movement_is_limited(void)
+{
+    state = standing(20000, 4);
+    state.first_noise_q8 = 65535 * 256 - 100;
+    in.i_ref = (dq_q15_t){0, 20300};
+    TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    TEST_ASSERT_EQUAL_INT32(mean_step(65535 * 256, 0, 12), state.first_noise_q8);
+}
+
+/* i_0 = 205, i_min = 819. */
+void test_only_a_slow_movement_of_enough_current_is_followed(void)
+{
+    static const struct {
+        int32_t from, way;
+        uint8_t since;
+        bool followed;
+    } cases[] = {{13107, 206, 4, true}, {13107, 206, 3, false}, {13107, 410, 32, true}, {13107, 411, 32, false},
+                 {820, 206, 4, true},   {819, 206, 4, false},   {13107, -410, 9, true}, {13107, -411, 9, false}};
+    for (unsigned k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        state = standing(cases[k].from, cases[k].since);
+        in.i_ref = (dq_q15_t){0, cases[k].from + cases[k].way};
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+        TEST_ASSERT_EQUAL_INT(cases[k].followed, state.steady != 1);
+        TEST_ASSERT_EQUAL_UINT8(1, state.since);
+    }
+}
+
+/* The threshold of a current of 13107 is 106 counts: r_0 may be 384/256 of it, or twice r. */
+void test_where_the_reference_stands_a_vague_comparison_begins_anew(void)
+{
+    static const struct {
+        int32_t noise_q8, first_noise_q8;
+        uint8_t since;
+        bool anew;
+    } cases[] = {{0, 384 * 106, 32, false},        {0, 384 * 106 + 1, 32, true}, {0, 384 * 106 + 1, 31, false},
+                 {30000, 60000, 32, false},        {30000, 60001, 32, true},     {0, 400000, 1, false},
+                 {20000, 384 * 106 + 1, 32, true}, {25000, 50000, 32, false}};
+    for (unsigned k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        state = standing(13107, cases[k].since);
+        state.noise_q8 = cases[k].noise_q8;
+        state.first_noise_q8 = cases[k].first_noise_q8;
+        in.i_ref = (dq_q15_t){0, 13107};
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+        TEST_ASSERT_EQUAL_INT(cases[k].anew, state.steady == 1);
+        TEST_ASSERT_EQUAL_UINT8(cases[k].anew ? 1 : fmin(32, cases[k].since + 1), state.since);
     }
 }
 
