@@ -12,6 +12,7 @@ from fluxtrue_tools.emulate.core import CENTRE, Core, EmulationStoppedError
 
 CORE_S = 1 / 48e6  # after reset the core runs from the fast internal clock
 CLOCK_S = 1 / 12e6  # of the converter and the interval timer, as set up here
+CALIBRATION_S = 14_000 * CLOCK_S  # assumed, adc.c
 CONVERSION_S = 43 * CLOCK_S  # SMPLTS 12: 13 + 30 clocks
 COCO, AIEN, ADTRG = 0x80, 0x40, 0x40
 ADC0_IRQ, LPIT0_IRQ, CAN0_IRQ = 39, 48, 81
@@ -49,8 +50,11 @@ def refused(core: Core, name: str, value: int, message: str) -> None:
 def adc(core: Core) -> Core:
     clock(core, "ADC0")
     for name, value in (("CFG1", 4), ("CFG2", 12), ("CLPS", 0), ("CLP3", 0), ("CLP2", 0), ("CLP1", 0), ("CLP0", 0),
-                        ("CLPX", 0), ("CLP9", 0), ("SC3", 0x87), ("SC3", 0), ("SC10", 31)):  # fmt: skip
+                        ("CLPX", 0), ("CLP9", 0), ("SC3", 0x87)):  # fmt: skip
         core.store(f"ADC0.{name}", value)
+    core.run(CALIBRATION_S)
+    core.store("ADC0.SC3", 0)
+    core.store("ADC0.SC10", 31)
     return core
 
 
