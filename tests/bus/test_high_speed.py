@@ -159,11 +159,23 @@ def runs_again(ecu: Ecu) -> None:
     assert ecu.truth("torque_mean_Nm") == pytest.approx(20.0, abs=2.0)
 
 
+def turn_by_standstill_to(ecu: Ecu, rpm: float) -> None:
+    """As turn_to(); backwards by way of standstill."""
+    turn_to(ecu, 0.0 if rpm < 0.0 else rpm, 2.0)
+    turn_to(ecu, rpm, 2.0)
+
+
+def delivers_at(ecu: Ecu, rpm: float, torque_Nm: float) -> None:
+    """Whether the drive delivers the requested torque at this speed."""
+    turn_by_standstill_to(ecu, rpm)
+    ecu.run(200, TorqueRequested=torque_Nm)
+    assert ecu.truth("torque_mean_Nm") == pytest.approx(torque_Nm, abs=2.0)
+
+
 # hsm1: with the short circuit at once 529 A and 98 N.m, a latched over-current, and no reset until the machine is slow.
 @pytest.mark.parametrize("rpm", [8200.0, 9000.0, 10000.0, -9500.0])
 def test_enable_off_at_speed_is_gentle_latches_nothing_and_can_be_taken_back(fast: Ecu, rpm: float) -> None:
-    turn_to(fast, 0.0 if rpm < 0.0 else rpm, 2.0)
-    turn_to(fast, rpm, 2.0)
+    turn_by_standstill_to(fast, rpm)
     leaves_torque_gently(fast)
 
 
@@ -172,10 +184,7 @@ def test_enable_off_at_speed_is_gentle_latches_nothing_and_can_be_taken_back(fas
 def test_enable_off_at_speed_ends_the_torque_of_a_loaded_machine_in_50_ms(
     fast: Ecu, rpm: float, torque_Nm: float
 ) -> None:
-    turn_to(fast, 0.0 if rpm < 0.0 else rpm, 2.0)
-    turn_to(fast, rpm, 2.0)
-    fast.run(200, TorqueRequested=torque_Nm)
-    assert fast.truth("torque_mean_Nm") == pytest.approx(torque_Nm, abs=2.0)
+    delivers_at(fast, rpm, torque_Nm)
     fast.command["Enable"] = 0
     low, high = min(0.0, torque_Nm) - 2.0, max(0.0, torque_Nm) + 2.0
     seen = watched(fast, 50)
@@ -189,10 +198,7 @@ def test_enable_off_at_speed_ends_the_torque_of_a_loaded_machine_in_50_ms(
 def test_an_overheated_drive_moves_its_currents_for_10_ms_before_the_short_circuit(
     fast: Ecu, rpm: float, torque_Nm: float
 ) -> None:
-    turn_to(fast, 0.0 if rpm < 0.0 else rpm, 2.0)
-    turn_to(fast, rpm, 2.0)
-    fast.run(200, TorqueRequested=torque_Nm)
-    assert fast.truth("torque_mean_Nm") == pytest.approx(torque_Nm, abs=2.0)
+    delivers_at(fast, rpm, torque_Nm)
     assert fast.lib.sim_set(fast.sim, b"inverter_C", 120.0) == 0
     seen = watched(fast, 300)
     at = next(k for k, each in enumerate(seen) if each.fault_word)  # the millisecond in which the fault is latched

@@ -5,8 +5,8 @@ The firmware needs some inductance, flux and resistance to be built at all. They
 speed: the magnet's back-EMF reaches the dc voltage at a third of the maximum speed, and its flux divided by the maximum
 current is the inductance, as in a machine whose short-circuit current is its maximum current. The gains of the current
 control come from a tenth of that inductance, so that the loop gain is never higher than in a finished motor while the
-true inductances are at least a tenth of the guess; with larger ones the control is slower. What this
-leaves, from a tenth to ten times the guess, is in tests/commission/test_guess.py.
+true inductances are at least a tenth of the guess; with larger ones the control is slower.
+tests/commission/test_guess.py measures what this leaves from a tenth to ten times the guess.
 """
 
 import math
