@@ -84,7 +84,7 @@ static uint32_t check_rise(drive_t *drive, int32_t v_dc, uint32_t of_sample)
     return faults;
 }
 
-void acquire_check(drive_t *drive, const sample_t *sample, bool run)
+abc_q15_t acquire_check(drive_t *drive, const sample_t *sample, bool run)
 {
     const monitor_config_t *config = &drive->period.monitor;
     const monitor_in_t in = {.i = measure_phases(sample->i_ab, sample->zero_q28), .v_dc = sample->v_dc};
@@ -100,4 +100,5 @@ void acquire_check(drive_t *drive, const sample_t *sample, bool run)
         /* A bridge that is off may have no dc voltage: under-voltage counts only while it runs. */
         drive_raise_fault(drive, run ? faults : faults & ~(uint32_t)FAULT_UNDER_VOLTAGE);
     }
+    return in.i;
 }

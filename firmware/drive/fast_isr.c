@@ -41,10 +41,10 @@ static void reset_control(drive_t *drive, sample_t *sample)
 }
 
 /* The safe state: all switches of one side on (short circuit), or switching disabled (freewheel). */
-static void apply_safe_state(drive_t *drive, sample_t *sample, const command_t *command, const rotor_frame_t *now)
+static void apply_safe_state(drive_t *drive, sample_t *sample, const command_t *command, const safe_period_t *now)
 {
-    if (short_circuit_may_begin(drive, sample, now->rotation) && short_circuit_is_needed(&drive->fast, command->safe)) {
-        short_circuit_step(drive, sample, command->upper, now->angle_step, now->rotation);
+    if (short_circuit_may_begin(drive, now) && short_circuit_is_needed(&drive->fast, command->safe)) {
+        short_circuit_step(drive, now, command->upper);
     } else {
         short_circuit_end(&drive->fast);
     }
@@ -162,14 +162,16 @@ static void reset_faults(drive_t *drive, uint32_t requested)
     }
 }
 
-/* Park, the flux tables, and the angle in the middle of the period in which the duties will act: 1.5 periods ahead. */
-static rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *sample, int32_t angle_step)
+/* Park and the flux tables; where duties follow, also the angle in the middle of the period in which they will act, 1.5
+ * periods ahead. */
+static inline FX_INLINED rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *sample, int32_t angle_step,
+                                                      bool duties_follow)
 {
     const fx_pair_t rotation = fx_rotation(sample->theta_e);
     const dq_q15_t measured = park_pair(sample->i_ab, rotation);
     sample->point.i = measured;
     const uint32_t ahead = (uint32_t)angle_step + (uint32_t)(angle_step >> 1);
-    const fx_pair_t advanced = fx_rotation(sample->theta_e + ahead);
+    const fx_pair_t advanced = duties_follow ? fx_rotation(sample->theta_e + ahead) : 0;
     sample->point.flux = flux_table_step(&drive->period.flux_table, measured);
     return (rotor_frame_t){fx_pair(measured.d, measured.q), rotation, advanced, sample->v_dc, angle_step};
 }
@@ -199,9 +201,10 @@ static FX_NOT_INLINED FX_COLD void run_period_checked(drive_t *drive, sample_t *
     const command_t *command = command_box_read(&drive->commands);
     fast_state_t *fast = &drive->fast;
     const bool turning = turning_control_used(&drive->motor->turning_control);
-    acquire_check(drive, sample, command->run != (uint8_t)BRIDGE_OFF);
-    const rotor_frame_t now = to_rotor_frame(drive, sample, angle_step);
-    if (command->run != (uint8_t)BRIDGE_OFF && fast->faults == 0U) {
+    const abc_q15_t i = acquire_check(drive, sample, command->run != (uint8_t)BRIDGE_OFF);
+    const bool runs = command->run != (uint8_t)BRIDGE_OFF && fast->faults == 0U;
+    const rotor_frame_t now = to_rotor_frame(drive, sample, angle_step, runs);
+    if (runs) {
         if ((command->run & (uint8_t)BRIDGE_PULSES) != 0U) {
             apply_pulses(drive, sample, &now);
         } else {
@@ -213,7 +216,8 @@ static FX_NOT_INLINED FX_COLD void run_period_checked(drive_t *drive, sample_t *
         if (command->faults != 0U) {
             drive_raise_fault(drive, command->faults);
         }
-        apply_safe_state(drive, sample, command, &now);
+        const safe_period_t safe = {sample, i, now.rotation, now.angle_step};
+        apply_safe_state(drive, sample, command, &safe);
     }
     fast->is_settled = !turning && fast->periods_since_enable >= PERIODS_TO_ACT && fast->monitor.pending == 0U;
     publish_sample(drive, sample);
@@ -244,7 +248,7 @@ FX_INLINES_CALLS void fast_isr(drive_t *drive)
         run_period_checked(drive, sample, acquired.angle_step);
         return;
     }
-    const rotor_frame_t now = to_rotor_frame(drive, sample, acquired.angle_step);
+    const rotor_frame_t now = to_rotor_frame(drive, sample, acquired.angle_step, true);
     control_currents(drive, sample, &now, &command->target);
     publish_sample(drive, sample);
 }

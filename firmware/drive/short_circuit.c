@@ -28,11 +28,11 @@ static bool is_searched(const fast_state_t *fast)
 }
 
 /* In the stator's frame, with the identified error of the magnet. */
-static ab_q15_t stator_flux(const drive_t *drive, const sample_t *sample, fx_pair_t rotation)
+static ab_q15_t stator_flux(const drive_t *drive, const safe_period_t *now)
 {
-    const flux_point_t *flux = &sample->point.flux;
+    const flux_point_t *flux = &now->sample->point.flux;
     const dq_q15_t psi = {fx_sat_q15(flux->psi_d + drive->psi_d_error), fx_sat_q15(flux->psi_q)};
-    const ab_q30_t psi_q30 = inverse_park_q30(psi, rotation);
+    const ab_q30_t psi_q30 = inverse_park_q30(psi, now->rotation);
     return (ab_q15_t){transform_round(psi_q30.alpha), transform_round(psi_q30.beta)};
 }
 
@@ -51,24 +51,23 @@ static bool is_flux_known(const drive_t *drive, const sample_t *sample)
 }
 
 /* The flux in every second period only: its sum has no need of every period, the direction of a current has. */
-static open_switch_t search(drive_t *drive, const sample_t *sample, int32_t angle_step, fx_pair_t rotation)
+static open_switch_t search(drive_t *drive, const safe_period_t *now)
 {
     const motor_t *m = drive->motor;
     short_circuit_t *state = &drive->fast.short_circuit;
     const open_switch_config_t config = {m->plausibility.i_dead, m->current_reference.i_max,
                                          (q15_t)(m->safe_state.psi_f / 2)};
-    const int32_t i_squared = i_squared_q30(drive, sample);
-    const uint32_t step_q16 = (uint32_t)fx_abs_q31(angle_step) >> 16;
+    const int32_t i_squared = i_squared_q30(drive, now->sample);
+    const uint32_t step_q16 = (uint32_t)fx_abs_q31(now->angle_step) >> 16;
     state->searches_flux = !state->searches_flux;
     if (state->searches_flux) {
-        const ab_q15_t psi = stator_flux(drive, sample, rotation);
+        const ab_q15_t psi = stator_flux(drive, now);
         const open_switch_t found = open_switch_by_flux(&config, &state->open_switch, psi, i_squared, 2U * step_q16);
         if (found != OPEN_SWITCH_NONE) {
             return found;
         }
     }
-    const open_switch_in_t in = {measure_phases(sample->i_ab, sample->zero_q28), i_squared, step_q16,
-                                 state->side == SHORT_CIRCUIT_UPPER};
+    const open_switch_in_t in = {now->i, i_squared, step_q16, state->side == SHORT_CIRCUIT_UPPER};
     return open_switch_by_currents(&config, &state->open_switch, &in);
 }
 
@@ -107,11 +106,11 @@ void short_circuit_apply(fast_state_t *fast, bool upper, open_switch_t found)
     state->holds = hal_pwm_gates();
 }
 
-void short_circuit_step(drive_t *drive, const sample_t *sample, bool upper, int32_t angle_step, fx_pair_t rotation)
+void short_circuit_step(drive_t *drive, const safe_period_t *now, bool upper)
 {
     open_switch_t found = OPEN_SWITCH_NONE;
     if (is_searched(&drive->fast)) {
-        found = search(drive, sample, angle_step, rotation);
+        found = search(drive, now);
     } else {
         open_switch_reset(&drive->fast.short_circuit.open_switch);
     }
@@ -127,16 +126,16 @@ static bool is_without_current(const drive_t *drive, const sample_t *sample)
 }
 
 /* Evaluates the last period, in which switching was disabled throughout. */
-static shorted_switch_t find_shorted(const drive_t *drive, const sample_t *sample, ab_q15_t psi)
+static shorted_switch_t find_shorted(const drive_t *drive, const safe_period_t *now, ab_q15_t psi)
 {
     const sample_t *last = sample_box_at(&drive->samples, drive->samples.generation);
     const open_switch_state_t *begin = &drive->fast.short_circuit.open_switch;
     const shorted_switch_in_t in = {
         .i_last = measure_phases(last->i_ab, last->zero_q28),
-        .i = measure_phases(sample->i_ab, sample->zero_q28),
+        .i = now->i,
         .psi_last = fx_pair(begin->begin_alpha, begin->begin_beta),
         .psi = fx_pair(psi.alpha, psi.beta),
-        .v_dc = sample->v_dc,
+        .v_dc = now->sample->v_dc,
         .turn_gain = drive->motor->launch_power.turn_gain,
         .i_min = (q15_t)(drive->motor->plausibility.i_dead >> 1),
     };
@@ -144,20 +143,19 @@ static shorted_switch_t find_shorted(const drive_t *drive, const sample_t *sampl
 }
 
 /* The flux of this sample ends a period and begins the next one. */
-static shorted_switch_t search_period(drive_t *drive, const sample_t *sample, fx_pair_t rotation)
+static shorted_switch_t search_period(drive_t *drive, const safe_period_t *now)
 {
     open_switch_state_t *begin = &drive->fast.short_circuit.open_switch;
-    const ab_q15_t psi = stator_flux(drive, sample, rotation);
-    const bool is_known = is_flux_known(drive, sample);
-    const shorted_switch_t found = (is_known && begin->has_begun) ? find_shorted(drive, sample, psi)
-                                                                  : SHORTED_SWITCH_NONE;
+    const ab_q15_t psi = stator_flux(drive, now);
+    const bool is_known = is_flux_known(drive, now->sample);
+    const shorted_switch_t found = (is_known && begin->has_begun) ? find_shorted(drive, now, psi) : SHORTED_SWITCH_NONE;
     begin->has_begun = is_known;
     begin->begin_alpha = (q15_t)psi.alpha;
     begin->begin_beta = (q15_t)psi.beta;
     return found;
 }
 
-static void search_shorted(drive_t *drive, const sample_t *sample, fx_pair_t rotation)
+static void search_shorted(drive_t *drive, const safe_period_t *now)
 {
     fast_state_t *fast = &drive->fast;
     short_circuit_t *state = &fast->short_circuit;
@@ -165,14 +163,14 @@ static void search_shorted(drive_t *drive, const sample_t *sample, fx_pair_t rot
         return;
     }
     const uint32_t periods = drive->samples.generation + 1U - fast->fault_period; /* since the first fault */
-    const shorted_switch_t found = search_period(drive, sample, rotation);
+    const shorted_switch_t found = search_period(drive, now);
     if (found != SHORTED_SWITCH_NONE) {
         state->side = (found == SHORTED_SWITCH_UPPER) ? SHORT_CIRCUIT_UPPER : SHORT_CIRCUIT_LOWER;
         state->changes = CHANGES_MAX;
     }
     /* The drivers may have switched off in the middle of the period before the first fault. */
     if (periods > 0U &&
-        (found != SHORTED_SWITCH_NONE || periods >= SEARCH_PERIODS || !is_without_current(drive, sample))) {
+        (found != SHORTED_SWITCH_NONE || periods >= SEARCH_PERIODS || !is_without_current(drive, now->sample))) {
         state->waits = 0;
     }
 }
@@ -239,12 +237,12 @@ static void end_needless_wait(drive_t *drive, const sample_t *sample)
     }
 }
 
-bool short_circuit_may_begin(drive_t *drive, const sample_t *sample, fx_pair_t rotation)
+bool short_circuit_may_begin(drive_t *drive, const safe_period_t *now)
 {
     if ((drive->fast.faults & FAULT_GATE) != 0U) {
-        search_shorted(drive, sample, rotation);
+        search_shorted(drive, now);
     } else {
-        end_needless_wait(drive, sample);
+        end_needless_wait(drive, now->sample);
     }
     return !short_circuit_waits(&drive->fast);
 }

@@ -23,10 +23,17 @@
  * Context  fast ISR, in every period of the short circuit */
 #include "drive/drive.h"
 
-/** angle_step: of the field since the period before, 2^32 = one turn; rotation: cosine, sine of the sample's angle. */
-void short_circuit_step(drive_t *drive, const sample_t *sample, bool upper, int32_t angle_step, fx_pair_t rotation);
-/** The same without the search. upper: the side that the task has chosen; found: the switch that the search has found
- * in this period. */
+/** A period in which the bridge does not run. */
+typedef struct {
+    const sample_t *sample;
+    abc_q15_t i;        /* of the phases, in this sample */
+    fx_pair_t rotation; /* cosine, sine of its angle */
+    int32_t angle_step; /* of the field since the period before, 2^32 = one turn */
+} safe_period_t;
+
+/** upper: the side that the task has chosen. */
+void short_circuit_step(drive_t *drive, const safe_period_t *now, bool upper);
+/** The same without the search; found: the switch that the search has found in this period. */
 void short_circuit_apply(fast_state_t *fast, bool upper, open_switch_t found);
 
 /** While the bridge runs: after the next fault switching is disabled for so many periods before a short circuit. */
@@ -35,9 +42,9 @@ void short_circuit_prepare(fast_state_t *fast, uint32_t periods);
 /** Whether switching stays disabled in this period, before the short circuit; called once per period. */
 bool short_circuit_waits(fast_state_t *fast);
 
-/** The same with what may end the wait: the search for a shorted switch, or a small flux. rotation: cosine, sine of the
- * sample's angle. Called once per period of a fault in place of short_circuit_waits(). */
-bool short_circuit_may_begin(drive_t *drive, const sample_t *sample, fx_pair_t rotation);
+/** The same with what may end the wait: the search for a shorted switch, or a small flux. Called once
+ * per period of a fault in place of short_circuit_waits(). */
+bool short_circuit_may_begin(drive_t *drive, const safe_period_t *now);
 
 /** Ends the short circuit: switching is disabled, and the duties are one half. */
 void short_circuit_end(fast_state_t *fast);

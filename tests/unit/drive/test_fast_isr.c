@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "control/current/measure.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/short_circuit.h"
 #include "drive/slow_monitors.h"
@@ -238,12 +239,19 @@ void test_the_task_may_request_the_short_circuit_by_the_upper_switches(void)
     TEST_ASSERT_EQUAL_INT(16384, seam.duty.a);
 }
 
+/* As fast_isr() gives it to the short circuit. */
+static safe_period_t safe_period(const sample_t *sample, fx_pair_t rotation, int32_t angle_step)
+{
+    return (safe_period_t){sample, measure_phases(sample->i_ab, sample->zero_q28), rotation, angle_step};
+}
+
 /* One period of a short circuit in which phase a only conducts in this direction; a turn has twenty. */
 static void short_one_sided(int32_t i_a)
 {
     const sample_t sample = {.i_ab = fx_pair(i_a, 0), .point.i = {i_a, 0}};
     seam.log[0] = '\0';
-    short_circuit_step(&drive, &sample, false, INT32_MAX / 10, fx_pair(Q15(0.999), 0));
+    const safe_period_t now = safe_period(&sample, fx_pair(Q15(0.999), 0), INT32_MAX / 10);
+    short_circuit_step(&drive, &now, false);
 }
 
 /* Current out of the bridge by the lower switches, then into it by the upper ones, which ends the wait for a reset. */
@@ -279,7 +287,8 @@ static void short_with(const flux_point_t *flux, fx_pair_t rotation, dq_q15_t i,
     sign = -sign;
     const sample_t sample = {.i_ab = fx_pair(100 * sign, 0), .zero_q28 = zero_q28, .point = {.i = i, .flux = *flux}};
     seam.log[0] = '\0';
-    short_circuit_step(&drive, &sample, false, INT32_MAX / 10, rotation);
+    const safe_period_t now = safe_period(&sample, rotation, INT32_MAX / 10);
+    short_circuit_step(&drive, &now, false);
 }
 
 /* The same with this flux in the direction of phase a. */
@@ -375,7 +384,8 @@ void test_where_no_open_switch_is_searched_the_search_begins_anew(void)
         drive.fast.short_circuit.holds = k == 0;
         seam.gates = true;
         drive.fast.short_circuit.open_switch = seen;
-        short_circuit_step(&drive, &sample, false, 0, fx_pair(32767, 0));
+        const safe_period_t now = safe_period(&sample, fx_pair(32767, 0), 0);
+        short_circuit_step(&drive, &now, false);
         const open_switch_state_t *state = &drive.fast.short_circuit.open_switch;
         TEST_ASSERT_FALSE(state->has_begun);
         TEST_ASSERT_EQUAL_INT(0, state->one_sided_q16[0] + state->one_sided_q16[1] + state->one_sided_q16[2]);
@@ -590,7 +600,8 @@ static void search_in(const searched_t *given)
             .v_dc = V_DC};
         drive.samples.generation = 69U + k;
         if (k == 1U || given->periods != 0U) {
-            (void)short_circuit_may_begin(&drive, &sample, fx_pair(32767, 0));
+            const safe_period_t now = safe_period(&sample, fx_pair(32767, 0), 0);
+            (void)short_circuit_may_begin(&drive, &now);
         }
         drive.samples.slot[(70U + k) % SAMPLE_SLOTS] = sample;
     }
@@ -708,7 +719,8 @@ static bool begins_at_once(const waiting_t *given)
     const sample_t sample = {.point = {.i = given->i, .flux = {.psi_d = given->psi_d, .psi_q = given->psi_q}},
                              .zero_q28 = given->zero_q28,
                              .v_dc = V_DC};
-    return short_circuit_may_begin(&drive, &sample, fx_pair(32767, 0));
+    const safe_period_t now = safe_period(&sample, fx_pair(32767, 0), 0);
+    return short_circuit_may_begin(&drive, &now);
 }
 
 /* The wait would raise a smaller flux to that of the magnets. */
