@@ -4,6 +4,7 @@
 #include "drive/data_check.h"
 #include "ecu/ecu_private.h"
 #include "ecu/telemetry.h"
+#include "fx/codegen.h"
 #include "hal/adc.h"
 #include "hal/board.h"
 #include "hal/can.h"
@@ -188,7 +189,7 @@ static void service_watchdog(ecu_t *ecu)
 }
 
 /* In four of ten steps no frame is due, and nothing is collected for one. */
-static void send_frames(ecu_t *ecu)
+static FX_NOT_INLINED void send_frames(ecu_t *ecu)
 {
     telemetry_t telemetry;
     can_frame_t frame;
