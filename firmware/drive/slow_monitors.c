@@ -55,7 +55,7 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, const
     return plausibility_step(config, &task->plausibility, &in);
 }
 
-static uint32_t check_torque(drive_t *drive, const snapshot_t *snapshot)
+static uint32_t check_torque(drive_t *drive, const snapshot_t *snapshot, winding_resistance_t r)
 {
     const sample_t *sample = &snapshot->sample;
     task_state_t *task = &drive->task;
@@ -68,7 +68,7 @@ static uint32_t check_torque(drive_t *drive, const snapshot_t *snapshot)
         .omega = fx_q15_from_q31(sample->point.omega),
         .current = snapshot->i_magnitude,
         .torque = fx_q15_from_q31(task->torque_loop.model),
-        .winding_dC = snapshot->winding_dC,
+        .r = r,
     };
     return torque_monitor_step(&drive->motor->torque_monitor, &task->torque_monitor, &in);
 }
@@ -141,7 +141,8 @@ static bool is_angle_measured(const drive_t *drive, const sample_t *sample)
 }
 
 /* Called after check_angle(), which removes the voltage of the changing flux. */
-static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool acting, bool behind)
+static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool acting, bool behind,
+                             winding_resistance_t r)
 {
     task_state_t *task = &drive->task;
     const launch_power_in_t in = {
@@ -152,6 +153,7 @@ static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool ac
         .i_ref = task->i_ref,
         .psi_ref = task->psi_ref,
         .theta_e = snapshot->window.last.theta,
+        .r = r,
     };
     return launch_power_step(&drive->motor->launch_power, &task->launch_power, &in);
 }
@@ -206,9 +208,10 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
         return (of_currents & (FAULT_TEMPERATURE | FAULT_OVER_SPEED | FAULT_INPUT | FAULT_CURRENT_STUCK)) | shorted;
     }
     const bool behind = u_behind > drive->motor->torque_monitor.v_lag;
-    uint32_t faults = of_currents | check_torque(drive, snapshot) | shorted;
+    const winding_resistance_t r = torque_monitor_resistance(&drive->motor->torque_monitor, snapshot->winding_dC);
+    uint32_t faults = of_currents | check_torque(drive, snapshot, r) | shorted;
     faults |= check_angle(drive, snapshot, phases.reference, acting, behind);
-    faults |= check_launch(drive, snapshot, acting, behind);
+    faults |= check_launch(drive, snapshot, acting, behind, r);
     update_short_side(drive, snapshot, &phases);
     return faults;
 }

@@ -14,6 +14,11 @@
 #define EARLY_STEPS 16 /* after the means have settled: with noise, m_0 becomes a mean over EARLY_SHIFT */
 #define EARLY_SHIFT 3
 #define NOISE_SHIFT 4
+#define STANDING_STEPS 32 /* without a movement of the reference: it stands */
+#define SLOW_STEPS 4      /* between two movements of a reference that is followed */
+#define HALF_ROOT_Q8 181
+#define VAGUE_Q8 384 /* r_0 of 1.5 thresholds */
+#define NOISE_LIMIT UINT16_MAX
 #define NOISE_MAX 8 /* times v_1: largest noise of one step, as the currents may change without the reference */
 
 /* Half the product of a sum and a q15 number. */
@@ -22,12 +27,36 @@ static int32_t times(int32_t sum, int32_t x)
     return fx_mulhi(sum, x * 65536);
 }
 
-static bool has_moved(const launch_power_config_t *config, const launch_power_state_t *state,
-                      const launch_power_in_t *in)
+static bool has_turned(const launch_power_state_t *state, const launch_power_in_t *in)
 {
-    return in->theta_e - state->theta_e + FAST_ANGLE > 2U * FAST_ANGLE ||
-           fx_abs_q31(in->i_ref.d - state->i_ref.d) > config->i_0 ||
-           fx_abs_q31(in->i_ref.q - state->i_ref.q) > config->i_0;
+    return in->theta_e - state->theta_e + FAST_ANGLE > 2U * FAST_ANGLE;
+}
+
+/* By how much, on the axis on which it has moved more. */
+static int32_t moved_by(const launch_power_state_t *state, const launch_power_in_t *in)
+{
+    return fx_max_s32(fx_abs_q31(in->i_ref.d - state->i_ref.d), fx_abs_q31(in->i_ref.q - state->i_ref.q));
+}
+
+/* The loss of the sum of a step in a resistance, for a product of currents in q30; Q8. */
+static int32_t loss_q8(const launch_power_config_t *config, q16_t r, int32_t i_squared)
+{
+    return (fx_mulhi(r * 16384, i_squared) >> 6) * (int32_t)config->periods;
+}
+
+/* (MN-57): the legs keep their voltage, so that m_0 is in proportion to the current but for the resistance. */
+static void follow_reference(const launch_power_config_t *config, launch_power_state_t *state,
+                             const launch_power_in_t *in, q15_t before)
+{
+    const int32_t now = fx_magnitude(in->i_ref.d, in->i_ref.q);
+    const int32_t change = now - before;
+    const int32_t share = change * 32768 / before;
+    const int32_t doubt = (loss_q8(config, in->r.error, now * fx_abs_q31(change)) >> 8) +
+                          times(config->v_1, fx_abs_q31(change));
+    state->first_power_q8 += 2 * times(state->first_power_q8, share) + loss_q8(config, in->r.r, now * change);
+    state->first_noise_q8 += 2 * times(state->first_noise_q8, share) + doubt * HALF_ROOT_Q8;
+    state->first_noise_q8 = fx_min_s32(state->first_noise_q8, NOISE_LIMIT * 256);
+    state->i_ref = (dq_q15_halfword_t){(q15_t)in->i_ref.d, (q15_t)in->i_ref.q};
 }
 
 /* The power that neither the tables' torque nor the flux accounts for (MN-28). */
@@ -54,7 +83,7 @@ static void update_noise(const launch_power_config_t *config, launch_power_state
     }
     const int32_t deviation = power - (state->power_q8 >> 8);
     const bool above = deviation > 0;
-    const int32_t limited = fx_min_s32(fx_abs_q31(deviation), fx_min_s32(NOISE_MAX * loss_max, UINT16_MAX));
+    const int32_t limited = fx_min_s32(fx_abs_q31(deviation), fx_min_s32(NOISE_MAX * loss_max, NOISE_LIMIT));
     const int32_t noise_q8 = (above != state->above) ? limited * 256 : 0; /* noise changes its sign, a fault does not */
     const bool settled = state->steady >= config->settle_steps;
     state->above = above;
@@ -64,20 +93,52 @@ static void update_noise(const launch_power_config_t *config, launch_power_state
     state->first_noise_q8 = settled ? mean_step(state->first_noise_q8, of_first_q8, shift) : state->noise_q8;
 }
 
+/* After a reference that has moved far, r_0 may be much more than noise: a comparison that begins anew finds less. */
+static bool is_vague(const launch_power_state_t *state, int32_t loss_max)
+{
+    return state->first_noise_q8 > fx_max_s32(2 * state->noise_q8, VAGUE_Q8 * loss_max);
+}
+
+/* A reference that has moved slowly, with enough current before to be followed. */
+static bool can_follow(const launch_power_config_t *config, const launch_power_state_t *state, q15_t before,
+                       int32_t way)
+{
+    return way > config->i_0 && way <= 2 * config->i_0 && state->since >= SLOW_STEPS && before > config->i_min;
+}
+
+/* True if the means begin anew. before: the current at the last movement. */
+static bool begins_anew(const launch_power_config_t *config, launch_power_state_t *state, const launch_power_in_t *in,
+                        q15_t before, int32_t loss_max)
+{
+    const int32_t way = moved_by(state, in);
+    const bool moved = way > config->i_0;
+    const bool vague = state->since == STANDING_STEPS && is_vague(state, loss_max);
+    const bool follows = can_follow(config, state, before, way);
+    state->since = (moved || vague) ? 1U : (uint8_t)fx_min_s32(state->since + 1, STANDING_STEPS);
+    if (vague || in->behind || has_turned(state, in)) {
+        return true;
+    }
+    if (follows) {
+        follow_reference(config, state, in, before);
+    }
+    return moved && !follows;
+}
+
 /* True while there is a power to compare with. */
 static bool update_means(const launch_power_config_t *config, launch_power_state_t *state, const launch_power_in_t *in)
 {
-    const bool moved = has_moved(config, state, in);
+    const q15_t before = fx_magnitude(state->i_ref.d, state->i_ref.q);
+    const int32_t loss_max = times(config->v_1, before);
+    const bool anew = begins_anew(config, state, in, before, loss_max);
     const int32_t omega = fx_mulhi((int32_t)(in->theta_e - state->theta_e), config->turn_gain);
     state->theta_e = in->theta_e;
-    if (moved || in->behind) {
+    if (anew) {
         state->i_ref = (dq_q15_halfword_t){(q15_t)in->i_ref.d, (q15_t)in->i_ref.q};
         state->steady = 1; /* the next step begins the means */
         return false;
     }
     const int shift = (state->steady < MOVING_STEPS) ? 0 : MEAN_SHIFT;
     const int32_t power = other_power(in, omega);
-    const int32_t loss_max = times(config->v_1, fx_magnitude(state->i_ref.d, state->i_ref.q));
     update_noise(config, state, power, loss_max);
     state->power_q8 = mean_step(state->power_q8, power * 256, shift);
     state->omega_q8 = mean_step(state->omega_q8, omega * 256, shift);

@@ -43,33 +43,27 @@ q15_t torque_monitor_missing_voltage(q15_t lag, dq_q15_t psi)
     return (lag == 0) ? 0 : fx_mul_q15(fx_abs_q15(lag), fx_magnitude(psi.d, psi.q));
 }
 
-/* Resistance at the winding's temperature, and its largest error. */
-typedef struct {
-    q16_t r, error;
-} resistance_t;
-
 static q31_t resistance_at(const torque_monitor_config_t *config, int32_t dC)
 {
     return config->r + config->r_per_dC * (dC - 200); /* 20 C */
 }
 
-/* (MN-32). A reading beyond the range of the winding's temperature counts as the end of the range. */
-static resistance_t resistance(const torque_monitor_config_t *config, int16_t winding_dC)
+winding_resistance_t torque_monitor_resistance(const torque_monitor_config_t *config, int16_t winding_dC)
 {
     const int32_t min_dC = config->winding_min_dC, max_dC = config->winding_max_dC;
     if (temperature_is_known(winding_dC)) {
         const q31_t known = resistance_at(config, fx_clamp_q31(winding_dC, min_dC, max_dC));
-        return (resistance_t){known >> 15, known / TOLERANCE >> 15};
+        return (winding_resistance_t){known >> 15, known / TOLERANCE >> 15};
     }
     const q31_t middle = resistance_at(config, (min_dC + max_dC) / 2);
     const q31_t half_range = resistance_at(config, max_dC) - middle;
-    return (resistance_t){middle >> 15, (half_range + middle / TOLERANCE) >> 15};
+    return (winding_resistance_t){middle >> 15, (half_range + middle / TOLERANCE) >> 15};
 }
 
 /* Present speed and resistance of the machine, each with its largest error, and the magnitude of its current. */
 typedef struct {
     speed_t speed;
-    resistance_t r;
+    winding_resistance_t r;
     q15_t current;
 } machine_t;
 
@@ -144,7 +138,7 @@ uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monit
         return 0;
     }
     const dq_q15_t rate = flux_rate(config, state, in->psi);
-    const machine_t now = {follow_speed(config, state, in->omega), resistance(config, in->winding_dC), in->current};
+    const machine_t now = {.speed = follow_speed(config, state, in->omega), .r = in->r, .current = in->current};
     const dq_q15_t psi_mean = {(in->psi.d + state->psi.d) / 2, (in->psi.q + state->psi.q) / 2};
     state->psi = in->psi;
     state->omega = in->omega;

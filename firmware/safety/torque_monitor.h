@@ -24,6 +24,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "safety/winding_types.h"
 #include "types/frames.h"
 #include "types/temperature.h"
 
@@ -57,10 +58,12 @@ typedef struct {
     dq_q15_t u_mean;    /* acting voltage, mean of the last step; u if there is none */
     q15_t omega;        /* tracked: lags behind the rotor */
     q15_t torque;       /* commanded, as the closed loop follows it */
-    int16_t winding_dC; /* or one of types/temperature.h */
-    q15_t current;      /* magnitude of i */
+    winding_resistance_t r;
+    q15_t current; /* magnitude of i */
 } torque_monitor_in_t;
 
+/** (MN-32); a reading beyond the range of the winding's temperature counts as the end of the range. */
+winding_resistance_t torque_monitor_resistance(const torque_monitor_config_t *config, int16_t winding_dC);
 /** Lag of the tracked speed behind the rotor's beyond the apparent lag that one count of the sensor causes, else 0
  * (MN-41). Before torque_monitor_step() with the same speed. */
 q15_t torque_monitor_lag(const torque_monitor_config_t *config, const torque_monitor_state_t *state, q15_t tracked);

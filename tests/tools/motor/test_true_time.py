@@ -45,7 +45,7 @@ PERIOD = {
 PERIODS_PER_STEP = {
     "bases.periods_per_step", "commission.periods_per_step", "commission.mean_gain_q31", "identify.mean_gain_q32",
     "identify.limited_noise", "frozen_angle.v_0", "frozen_angle.rate_gain",
-    "launch_power.v_1", "launch_power.turn_gain",
+    "launch_power.v_1", "launch_power.turn_gain", "launch_power.periods",
 }  # fmt: skip
 STEP = {
     "bases.step_s", "trim_steps", "parameters.torque_slew", "torque_slew_weak",
@@ -98,6 +98,8 @@ COUNTS = {
     "SWING_STEPS": "steps of the damping, as docs/theory/commissioning.md says",
     "MOVING_STEPS": "steps, as docs/theory/monitors.md says",
     "EARLY_STEPS": "steps, as that page says",
+    "SLOW_STEPS": "steps, as that page says",
+    "STANDING_STEPS": "steps, as that page says",
     "NOISE_MAX": "share of a threshold",
     "REFERENCE_STEPS": "steps, as that page says",
     "ZERO_STEPS": "steps, as that page says",

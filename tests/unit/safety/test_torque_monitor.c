@@ -26,12 +26,14 @@ static const torque_monitor_config_t config = {.r = 898 << 15,
                                                .settle_steps = 5};
 static torque_monitor_state_t state;
 static torque_monitor_in_t in;
+static int16_t winding_dC = 200;
 
 enum { SETTLING = 5, NOISE = 2000 };
 
 static uint32_t monitor_step(const torque_monitor_config_t *c)
 {
     in.current = fx_magnitude(in.i.d, in.i.q);
+    in.r = torque_monitor_resistance(c, winding_dC);
     return torque_monitor_step(c, &state, &in);
 }
 
@@ -58,7 +60,6 @@ static void machine(double omega, double i_d, double i_q, double magnet, double 
         .psi = {q15(0.44 + 0.65 * d), q15(1.6 * q)},
         .omega = (q15_t)q15(omega),
         .torque = (q15_t)q15(psi_d * i_q - psi_q * i_d),
-        .winding_dC = 200,
     };
     in.u_mean = in.u;
 }
@@ -80,6 +81,7 @@ static void fresh(void)
 
 void setUp(void)
 {
+    winding_dC = 200;
     fresh();
     machine(0.5, -0.2, 0.2, 1.0, 0.0);
 }
@@ -378,7 +380,7 @@ void test_the_resistance_is_that_of_the_windings_temperature_or_of_any_that_it_m
         const double r = 0.1 * (1.0 + 0.000393 * (windings[k].winding_dC - 200)) - 898.0 / 65536.0;
         in.u.d += q15(-0.6 * r);
         in.u.q += q15(0.4 * r);
-        in.winding_dC = windings[k].measured_dC;
+        winding_dC = windings[k].measured_dC;
         uint32_t found = 0;
         for (int n = 0; n < 60; n++) {
             found |= monitor_step(&lossy);
@@ -446,8 +448,8 @@ void test_the_tolerance_of_the_resistance_is_an_eighth_at_every_temperature(void
     for (int k = 0; k < 2; k++) {
         const torque_monitor_config_t *c = k ? &warm : &cold;
         for (int beyond = 0; beyond <= 2; beyond += 2) {
-            in = (torque_monitor_in_t){
-                .u = {0, 8192 + 1024 + beyond}, .i = {0, 16384}, .omega = 16384, .winding_dC = k ? 712 : 200};
+            in = (torque_monitor_in_t){.u = {0, 8192 + 1024 + beyond}, .i = {0, 16384}, .omega = 16384};
+            winding_dC = k ? 712 : 200;
             const bool found = (faults_at(c, (1024 + beyond) / 2) & FAULT_TORQUE) != 0U;
             TEST_ASSERT_EQUAL(beyond > 0, found);
         }
@@ -462,15 +464,15 @@ void test_without_a_temperature_the_resistance_may_be_that_of_any(void)
     c.r = 1 << 30;
     c.r_per_dC = 1 << 19;
     for (int beyond = 0; beyond <= 2; beyond += 2) {
-        in = (torque_monitor_in_t){
-            .u = {0, 10192 + 5674 + beyond}, .i = {0, 16384}, .omega = 16384, .winding_dC = TEMPERATURE_UNKNOWN};
+        in = (torque_monitor_in_t){.u = {0, 10192 + 5674 + beyond}, .i = {0, 16384}, .omega = 16384};
+        winding_dC = TEMPERATURE_UNKNOWN;
         TEST_ASSERT_EQUAL(beyond > 0, (faults_at(&c, (5674 + beyond) / 2) & FAULT_TORQUE) != 0U);
     }
 }
 
 static bool angle_found(const torque_monitor_config_t *c, int32_t u_d, int32_t u_q, int32_t i_d)
 {
-    in = (torque_monitor_in_t){.u = {u_d, u_q}, .u_mean = {u_d, u_q}, .i = {i_d, 0}, .omega = 16384, .winding_dC = 200};
+    in = (torque_monitor_in_t){.u = {u_d, u_q}, .u_mean = {u_d, u_q}, .i = {i_d, 0}, .omega = 16384};
     return (faults_at(c, 0) & FAULT_ANGLE_OFFSET) != 0U;
 }
 
@@ -508,8 +510,7 @@ void test_the_drop_of_the_whole_resistance_is_allowed_along_the_back_emf(void)
     c.r = 6554 << 15;
     for (int beyond = 0; beyond < 2; beyond++) {
         const int32_t u_q = 6700 + 150 * beyond;
-        in = (torque_monitor_in_t){
-            .u = {0, u_q}, .u_mean = {0, u_q}, .i = {0, 16384}, .omega = 16384, .winding_dC = 200};
+        in = (torque_monitor_in_t){.u = {0, u_q}, .u_mean = {0, u_q}, .i = {0, 16384}, .omega = 16384};
         TEST_ASSERT_EQUAL(beyond > 0, (faults_at(&c, 0) & FAULT_ANGLE_OFFSET) != 0U);
     }
 }
@@ -636,7 +637,7 @@ void test_no_argument_wraps(void)
                                    {end_of(bits, 3), end_of(bits, 2)},
                                    end_of(bits, 8),
                                    torques[bits >> 9],
-                                   200,
+                                   {0, 0},
                                    0};
         for (int n = 0; n < 30; n++) {
             const uint32_t faults = monitor_step(&immediate);

@@ -543,6 +543,7 @@ def _launch_power(motor: Motor) -> list[Row]:
         ("psi_share", q15(LAUNCH_FLUX_SHARE * d.psi_f_Vs / b.flux_Vs, "psi_share"), f"{LAUNCH_FLUX_SHARE:g} psi_f"),
         ("i_0", q15(d.launch_A / b.current_A, "i_0"), f"{d.launch_A:g} A"),
         ("i_min", q15(d.monitor_A / b.current_A, "i_min"), f"{d.monitor_A:g} A"),
+        ("periods", str(b.periods_per_step), "of a step"),
         *_counts(b, settle=frozen_settle_s(motor.config), fault=ANGLE_S),
     ]
 
