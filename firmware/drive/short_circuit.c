@@ -3,6 +3,7 @@
 
 #include "control/current/measure.h"
 #include "control/current/transform.h"
+#include "fx/codegen.h"
 #include "hal/pwm.h"
 #include "safety/shorted_switch.h"
 #include "types/faults.h"
@@ -50,8 +51,9 @@ static bool is_flux_known(const drive_t *drive, const sample_t *sample)
     return i_squared_q30(drive, sample) <= i_max * i_max;
 }
 
-/* The flux in every second period only: its sum has no need of every period, the direction of a current has. */
-static open_switch_t search(drive_t *drive, const safe_period_t *now)
+/* The flux in every second period only: its sum has no need of every period, the direction of a current has. Not
+ * inlined: with its code, that of the search for a shorted switch, the longest fast ISR, would have too few registers. */
+static FX_NOT_INLINED open_switch_t search(drive_t *drive, const safe_period_t *now)
 {
     const motor_t *m = drive->motor;
     short_circuit_t *state = &drive->fast.short_circuit;
