@@ -381,6 +381,7 @@ def test_a_planted_wait_by_the_clock_is_found(tree: Path, path: str, line: str, 
         ("tests/live/CMakeLists.txt", "fluxtrue_pytest(NAME x PATH x.py LABELS y TIMEOUT 9)", "TIMEOUT"),
         ("tests/live/CMakeLists.txt", "set_tests_properties(x PROPERTIES RUN_SERIAL TRUE)", "RUN_SERIAL"),
         ("tests/tools/wait.sh", "sleep 1", "sleep"),
+        ("tests/pytest.ini", "faulthandler_timeout = 300", "faulthandler_timeout ="),
     ],
 )
 def test_a_planted_wait_that_is_not_in_python_is_found(tree: Path, path: str, line: str, word: str) -> None:

@@ -25,6 +25,8 @@ KEYWORDS = {"timeout", "timeout_s", "poll_frequency"}
 HANG = "HANG_S"
 C_CLOCK = re.compile(r"\b(((nano|u)?sleep|clock_gettime|gettimeofday|alarm|setitimer)\s*\(|time\((NULL|0|&)|clock\(\))")
 CMAKE_TIME = re.compile(r"\b(TIMEOUT|COST|RUN_SERIAL)\b")
+# faulthandler_timeout of pytest: a thread reads the stacks of the others while they run on, and may crash the test.
+SETTING_CLOCK = re.compile(r"^\s*\w*timeout\w*\s*=")
 SCRIPT_CLOCK = re.compile(r"\b(sleep|setTimeout|setInterval|timeout)\b")
 
 
@@ -79,6 +81,8 @@ def _found(root: Path, path: Path) -> Iterator[tuple[int, str]]:
         yield from _of_lines(lines(root, path), C_CLOCK)
     elif path.name == "CMakeLists.txt":
         yield from _of_lines(lines(root, path), CMAKE_TIME)
+    elif path.suffix == ".ini":
+        yield from _of_lines(lines(root, path), SETTING_CLOCK)
     elif path.suffix in (".sh", ".js"):
         yield from _of_lines(lines(root, path), SCRIPT_CLOCK)
 
