@@ -17,7 +17,7 @@ typedef struct {
 /** settled: angle and speed of the tracker have been set by its first two samples. */
 acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled);
 
-/** All sample monitors, with their counters; returns the currents of the phases. run: the bridge is commanded to act. */
+/** All sample monitors, with their counters; returns the phase currents. run: the bridge is commanded to act. */
 abc_q15_t acquire_check(drive_t *drive, const sample_t *sample, bool run);
 
 #endif

@@ -22,8 +22,7 @@
 
 #define PERIODS_TO_ACT 3 /* from enabling until the voltage of the whole last period is known */
 
-/* For current control and modulation. rotation: of the sample's angle; advanced: where the duties will act;
- * angle_step: 2^32 = one turn; v_dc: q15. */
+/* rotation: of the sample's angle; advanced: where the duties will act; angle_step: 2^32 = one turn; v_dc: q15. */
 typedef struct {
     fx_pair_t i_dq, rotation, advanced;
     int32_t v_dc;
@@ -162,18 +161,16 @@ static void reset_faults(drive_t *drive, uint32_t requested)
     }
 }
 
-/* Park and the flux tables; where duties follow, also the angle in the middle of the period in which they will act, 1.5
- * periods ahead. */
-static inline FX_INLINED rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *sample, int32_t angle_step,
-                                                      bool duties_follow)
+/* Park and the flux tables; if duties follow, the angle 1.5 periods ahead, in the middle of the period they act in. */
+static inline FX_INLINED rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *sample, int32_t step, bool drives)
 {
     const fx_pair_t rotation = fx_rotation(sample->theta_e);
     const dq_q15_t measured = park_pair(sample->i_ab, rotation);
     sample->point.i = measured;
-    const uint32_t ahead = (uint32_t)angle_step + (uint32_t)(angle_step >> 1);
-    const fx_pair_t advanced = duties_follow ? fx_rotation(sample->theta_e + ahead) : 0;
+    const uint32_t ahead = (uint32_t)step + (uint32_t)(step >> 1);
+    const fx_pair_t advanced = drives ? fx_rotation(sample->theta_e + ahead) : 0;
     sample->point.flux = flux_table_step(&drive->period.flux_table, measured);
-    return (rotor_frame_t){fx_pair(measured.d, measured.q), rotation, advanced, sample->v_dc, angle_step};
+    return (rotor_frame_t){fx_pair(measured.d, measured.q), rotation, advanced, sample->v_dc, step};
 }
 
 /* During the pulses only the monitors of the samples act: there is no identification and no slow monitor. */
@@ -200,7 +197,6 @@ static FX_NOT_INLINED FX_COLD void run_period_checked(drive_t *drive, sample_t *
 {
     const command_t *command = command_box_read(&drive->commands);
     fast_state_t *fast = &drive->fast;
-    const bool turning = turning_control_used(&drive->motor->turning_control);
     const abc_q15_t i = acquire_check(drive, sample, command->run != (uint8_t)BRIDGE_OFF);
     const bool runs = command->run != (uint8_t)BRIDGE_OFF && fast->faults == 0U;
     const rotor_frame_t now = to_rotor_frame(drive, sample, angle_step, runs);
@@ -216,10 +212,10 @@ static FX_NOT_INLINED FX_COLD void run_period_checked(drive_t *drive, sample_t *
         if (command->faults != 0U) {
             drive_raise_fault(drive, command->faults);
         }
-        const safe_period_t safe = {sample, i, now.rotation, now.angle_step};
-        apply_safe_state(drive, sample, command, &safe);
+        apply_safe_state(drive, sample, command, &(safe_period_t){sample, i, now.rotation, now.angle_step});
     }
-    fast->is_settled = !turning && fast->periods_since_enable >= PERIODS_TO_ACT && fast->monitor.pending == 0U;
+    fast->is_settled = fast->periods_since_enable >= PERIODS_TO_ACT && fast->monitor.pending == 0U &&
+                       !turning_control_used(&drive->motor->turning_control);
     publish_sample(drive, sample);
 }
 

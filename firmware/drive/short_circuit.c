@@ -52,7 +52,7 @@ static bool is_flux_known(const drive_t *drive, const sample_t *sample)
 }
 
 /* The flux in every second period only: its sum has no need of every period, the direction of a current has. Not
- * inlined: with its code, that of the search for a shorted switch, the longest fast ISR, would have too few registers. */
+ * inlined: beside its code, that of the search for a shorted switch, in the longest fast ISR, has too few registers. */
 static FX_NOT_INLINED open_switch_t search(drive_t *drive, const safe_period_t *now)
 {
     const motor_t *m = drive->motor;
