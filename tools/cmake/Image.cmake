@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 # A linked image of a port (hal/<port>): the firmware for FLUXTRUE_MOTOR with start-up code and drivers.
 
-# fluxtrue_image(<name> SOURCES <file> ... SCRIPT <linker script> [SEAL] [BUDGET <file>] [DEFINITIONS <D> ...]
-#                [LINK <option> ...])
+# fluxtrue_image(<name> SOURCES <file> ... SCRIPT <linker script> [SEAL] [BUDGET <file> [ANGLE <sensor>]]
+#                [DEFINITIONS <D> ...] [LINK <option> ...])
 #   <build>/<name>.elf and .bin; SEAL writes the checksum; a machine beyond the BUDGET of the port is refused before the
-#   image is linked, an image larger than its bounds afterwards
+#   image is linked, with what this angle sensor costs (tools/fluxtrue target fits --angle; left out: the encoder), an
+#   image larger than its bounds afterwards
 function(fluxtrue_image name)
-    cmake_parse_arguments(PARSE_ARGV 1 arg "SEAL" "SCRIPT;BUDGET" "SOURCES;DEFINITIONS;LINK")
+    cmake_parse_arguments(PARSE_ARGV 1 arg "SEAL" "SCRIPT;BUDGET;ANGLE" "SOURCES;DEFINITIONS;LINK")
     if(arg_UNPARSED_ARGUMENTS OR NOT arg_SOURCES OR NOT arg_SCRIPT)
         message(FATAL_ERROR "fluxtrue_image(${name}): wants SOURCES and SCRIPT; unknown: '${arg_UNPARSED_ARGUMENTS}'")
     endif()
@@ -27,8 +28,12 @@ function(fluxtrue_image name)
     if(arg_BUDGET)
         cmake_path(ABSOLUTE_PATH arg_BUDGET)
         string(REGEX REPLACE "^motor_" "" machine "${motor}")
+        set(angle "")
+        if(arg_ANGLE)
+            set(angle --angle ${arg_ANGLE})
+        endif()
         add_custom_command(TARGET ${name}_image PRE_LINK VERBATIM
-            COMMAND ${tool} fits "${CMAKE_BINARY_DIR}/motors/${machine}/motor.json" --budget "${arg_BUDGET}")
+            COMMAND ${tool} fits "${CMAKE_BINARY_DIR}/motors/${machine}/motor.json" --budget "${arg_BUDGET}" ${angle})
         set_property(TARGET ${name}_image APPEND PROPERTY LINK_DEPENDS "${arg_BUDGET}")
     endif()
     if(arg_SEAL)

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import shlex
 import subprocess
 import sys
 from itertools import pairwise
@@ -110,13 +112,26 @@ def _check_service_once_per_step(parts: Parts, elf: Path | None = None) -> None:
         assert core.resets == 0
 
 
-def test_a_machine_is_checked_before_its_image_is_linked(hsm1: Parts) -> None:
-    """The machines that fits() refuses are tested in tests/tools/target/test_fits.py."""
+def _command_before_the_link(folder: Path) -> str:
+    """The check of the machine, as the build calls it."""
     command = ["ninja", "-t", "commands", "fluxtrue.elf"]
-    done = subprocess.run(command, cwd=hsm1.image.parent, capture_output=True, text=True, check=True)
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     link = next(line for line in done.stdout.splitlines() if "-o fluxtrue.elf" in line)
-    before = link.partition("-o fluxtrue.elf")[0]
-    assert "target fits" in before and "/motor.json --budget" in before
+    return next(part for part in link.partition("-o fluxtrue.elf")[0].split(" && ") if "target fits" in part)
+
+
+@pytest.mark.parametrize("angle", build.FLASHED)
+def test_a_machine_is_checked_with_the_sensor_of_its_image_before_it_is_linked(hsm1: Parts, angle: str) -> None:
+    """The machines that fits() refuses are tested in tests/tools/target/test_fits.py; here one at 40 kHz."""
+    folder = hsm1.image.parent if angle == "encoder" else build.prepare("hsm1", angle=angle, flashed=True).image.parent
+    command = _command_before_the_link(folder)
+    own = re.search(r"\S+/motor\.json(?= --budget \S+/hal/s32k144/budget\.toml)", command)
+    assert own is not None
+    for motor, refused in ((own[0], False), (_motor(40).folder.folder / "motor.json", angle != "encoder")):
+        words = shlex.split(command.replace(own[0], str(motor)))
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        assert (done.returncode != 0) == refused, done.stdout + done.stderr
+        assert f"with the angle sensor {angle}," in done.stdout + done.stderr
 
 
 def test_the_times_of_the_bus_hold_within_a_step(parts: Parts, tmp_path: Path) -> None:

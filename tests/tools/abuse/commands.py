@@ -95,7 +95,8 @@ WRONG_TEXTS: dict[str, tuple[str, ...]] = {
     "--iron-loss-point": ("", "x", "1@x", "@3000", "nan@3000", "1@inf", "-1@3000", "1@-1", "1@1@1"),
     "--line": ("", "nosuch"), "--run": ("", "x", "paper/9/+"), "--lines": ("", "nosuch*"), "--group": ("", "nosuch"),
     "prove names": ("", "nosuch"), "mutate names": ("", "nosuch"),
-    "--base": ("", "nosuch"), "--scheduler": ("", "x", "tcp://", "tcp://host", "tcp://host:x", "tcp://h:99999"),
+    "--angle": ("", "quadrature"), "--base": ("", "nosuch"),
+    "--scheduler": ("", "x", "tcp://", "tcp://host", "tcp://host:x", "tcp://h:99999"),
 }  # fmt: skip
 
 NO_NUMBER = ("", "x", "nan", "inf", "-inf", "1,5", "0x10", "1e999", "١x")

@@ -62,11 +62,14 @@ def size(elf: Path, budget: Path) -> None:
 @target.command(cls=paths.Command)
 @click.argument("motor", type=paths.InputFile())
 @click.option("--budget", type=paths.InputFile(), required=True, help="The port's limits (budget.toml).")
-def fits(motor: Path, budget: Path) -> None:
+@click.option(
+    "--angle", default="encoder", show_default=True, help="The image's angle sensor, as docs/performance.json names it."
+)
+def fits(motor: Path, budget: Path, angle: str) -> None:
     """Refuse a machine (motor.json of a build) whose PWM the port cannot carry; print how busy it makes the port."""
     from fluxtrue_tools.target import fits as limits
 
-    click.echo(limits.check(motor, budget))
+    click.echo(limits.check(motor, budget, angle=angle))
 
 
 @target.command(cls=paths.Command)
