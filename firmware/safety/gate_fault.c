@@ -5,15 +5,26 @@
 #include "signal/debounce.h"
 
 #define QUIET_STEPS 50
+#define WRONG_ZEROS 4 /* times i_alive: what the zeros of two sensors may make */
 #define REST 16 /* q15: e at rest without dc voltage, 0.25 V where V_b is 500 V */
 
-/* A current that flows although switching is disabled and the dc link has opposed it for long enough (SS-10). */
+static bool is_beyond_offset(const gate_fault_config_t *config, const gate_fault_in_t *in, int32_t length)
+{
+    return !in->gates && in->currents_valid && length > config->i_alive + 2 * in->zero;
+}
+
+/* A current that flows although switching is disabled and the dc link has opposed it for long enough (SS-10). Without a
+ * report of the drivers it must be more than the zeros of two sensors make that are wrong against each other (SS-32).
+ */
 static bool is_switch_shorted(const gate_fault_config_t *config, gate_fault_state_t *state, const gate_fault_in_t *in,
-                              bool flows)
+                              int32_t length)
 {
     const int32_t opposed = state->opposed + fx_max_s32(in->v_dc - in->line_emf, 0);
-    state->opposed = (flows && !in->rectifies) ? fx_min_s32(opposed, config->volt_steps) : 0;
-    return state->opposed == config->volt_steps || (state->switch_shorted && in->latched);
+    const bool flows = is_beyond_offset(config, in, length) && !in->rectifies;
+    state->opposed = flows ? fx_min_s32(opposed, config->volt_steps) : 0;
+    const bool outlasts = state->opposed == config->volt_steps;
+    const bool certain = in->latched || length > WRONG_ZEROS * config->i_alive;
+    return (outlasts && certain) || (state->switch_shorted && (outlasts || in->latched));
 }
 
 /* Contactor and gate supply may be switched off: at rest, or if no switch is shorted, which a turning machine without
@@ -27,13 +38,14 @@ static bool may_release(gate_fault_state_t *state, const gate_fault_in_t *in, bo
 
 bool gate_fault_current_flows(const gate_fault_config_t *config, const gate_fault_in_t *in)
 {
-    return !in->gates && in->currents_valid && fx_magnitude(in->i.d, in->i.q) > config->i_alive + 2 * in->zero;
+    return is_beyond_offset(config, in, fx_magnitude(in->i.d, in->i.q));
 }
 
 bool gate_fault_step(const gate_fault_config_t *config, gate_fault_state_t *state, const gate_fault_in_t *in)
 {
-    const bool none = !in->gates && in->currents_valid && fx_magnitude(in->i.d, in->i.q) <= config->i_alive;
-    state->switch_shorted = is_switch_shorted(config, state, in, gate_fault_current_flows(config, in));
+    const int32_t length = fx_magnitude(in->i.d, in->i.q);
+    const bool none = !in->gates && in->currents_valid && length <= config->i_alive;
+    state->switch_shorted = is_switch_shorted(config, state, in, length);
     state->above = in->line_emf > in->v_dc >> (state->above ? 4 : 3);
     const bool released = may_release(state, in, none);
     state->holds_supply = in->latched && !released;

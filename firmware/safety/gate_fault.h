@@ -8,10 +8,12 @@
  *   A current above i_alive + 2 |i_0| although switching is disabled, while the sum of (v_dc - e) T over the steps
  *   exceeds 1.5 sqrt(3) psi_b: the dc link ends any current of the windings sooner, so a switch is shorted.
  *   That is a gate fault, too, and needs the short circuit until the faults are reset. i_0, the mean of the measured
- *   phases, excludes the offset of one sensor, which looks like a current of 2 |i_0|.
+ *   phases, excludes the offset of one sensor, which looks like a current of 2 |i_0|. Zeros of two sensors that are
+ *   wrong against each other have no mean. Unless the drivers have reported a fault, the current must therefore also
+ *   exceed 4 i_alive.
  *   Contactor and gate supply may be switched off with a gate fault when the machine is at rest (e <= v_dc/64), or when
  *   no switch is shorted and no current above i_alive was measured for 50 steps with switching disabled.
- * Source   docs/theory/safe-state.md (SS-9), (SS-10)
+ * Source   docs/theory/safe-state.md (SS-9), (SS-10), (SS-32)
  * Units    per unit
  * Range    every argument
  * Errors   none

@@ -9,7 +9,7 @@ Wrong currents at low speed are not found: their effect is that of a warm windin
 import itertools
 
 import pytest
-from faulted import inject
+from faulted import RPM, inject
 
 from fluxtrue_tools import faults
 from fluxtrue_tools.sim.library import Loop
@@ -73,3 +73,21 @@ def test_a_wrong_zero_of_a_current_is_found_or_does_not_change_the_torque(
     for rpm, torque in ((0, 100), (20, -20), *POINTS, (10000, 0)):
         seen = inject(hsm1, rpm, torque, fault, 0.3)
         assert seen.found_ms <= FOUND_MS or seen.error_ms == 0.0, (rpm, torque, seen)
+
+
+@pytest.mark.parametrize("rpm", [1500.0, -1500.0])
+@pytest.mark.parametrize("offset_A", [16.0, 28.0])
+def test_zeros_that_are_wrong_against_each_other_are_no_shorted_switch(
+    paper: Motor, offset_A: float, rpm: float
+) -> None:
+    """The fault of the control disables switching; without a current the short circuit is not needed (SS-32)."""
+    parameters = paper.plant | {"imposed_speed": 1.0, "speed_rad_s": rpm * RPM}
+    with Loop(paper.library, parameters, paper.flux_map) as loop:
+        loop.record(("truth.i_d_A", "truth.i_q_A"))
+        loop.set("enable", 1.0)
+        loop.run_s(0.1)
+        loop.set("plant.current_offset_A_a", offset_A)
+        loop.set("plant.current_offset_A_b", -offset_A)
+        rows = loop.run_s(0.2)
+        assert faults.named(int(loop.get("fault_word"))) == ["control"]
+        assert abs(rows[-1]).max() < 1e-9
