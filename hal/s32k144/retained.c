@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/s32k144/retained.h"
 
+#include "fx/codegen.h"
 #include "hal/s32k144/core.h"
 #include "hal/s32k144/registers.h"
 
@@ -17,6 +18,17 @@ typedef struct {
 
 static volatile copy_t copies[2] __attribute__((section(".retained")));
 static uint32_t sequence; /* of the next copy */
+
+static void open_copies(void)
+{
+    SIM->CHIPCTL = SIM->CHIPCTL | SIM_CHIPCTL_SRAMU_RETEN;
+}
+
+static void keep_copies(void)
+{
+    __asm__ volatile("dsb" ::: "memory");
+    SIM->CHIPCTL = SIM->CHIPCTL & ~SIM_CHIPCTL_SRAMU_RETEN;
+}
 
 /* A word whose write the reset has interrupted may be uncorrectable: reading it is a bus fault. */
 static bool read_copy(const volatile copy_t *from, uint32_t word[WORDS])
@@ -39,7 +51,7 @@ static void discard(void)
     copies[1].word[MAGIC_WORD] = 0;
 }
 
-bool retained_read(retained_t *retained)
+static bool read_newest(retained_t *retained)
 {
     uint32_t first[WORDS], second[WORDS];
     if ((RCM->SRS & (RCM_SRS_POR | RCM_SRS_LVD)) != 0U) {
@@ -64,6 +76,15 @@ bool retained_read(retained_t *retained)
     return true;
 }
 
+/* Kept again at once: the next reset may come before the first copy is written. It runs once: compiled for size. */
+FX_NOT_INLINED FX_COLD bool retained_read(retained_t *retained)
+{
+    open_copies();
+    const bool is_valid = read_newest(retained);
+    keep_copies();
+    return is_valid;
+}
+
 void retained_write(const retained_t *retained)
 {
     const before_reset_t *drive = &retained->drive;
@@ -75,12 +96,11 @@ void retained_write(const retained_t *retained)
         [PSI_D_ERROR] = (uint16_t)drive->psi_d_error,
     };
     volatile copy_t *to = &copies[sequence & 1U];
-    SIM->CHIPCTL = SIM->CHIPCTL | SIM_CHIPCTL_SRAMU_RETEN;
+    open_copies();
     for (uint32_t k = 0; k < WORDS; k++) {
         to->word[k] = word[k];
         to->complement[k] = ~word[k];
     }
-    __asm__ volatile("dsb" ::: "memory");
-    SIM->CHIPCTL = SIM->CHIPCTL & ~SIM_CHIPCTL_SRAMU_RETEN;
+    keep_copies();
     sequence++;
 }

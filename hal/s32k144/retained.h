@@ -4,7 +4,8 @@
 /** Data that outlast a reset, in SRAM_U, which holds nothing else. Two copies are written in turn, each with a magic
  * word, a sequence number and the complement of every word: a reset during a write leaves the previous copy.
  *   SIM_CHIPCTL.SRAMU_RETEN = 0 makes the RAM keep its content through a reset; meanwhile nothing may access it.
- *   Therefore it is 1 only while a copy is written. A reset sets it to 1 itself.
+ *   Therefore it is 1 only while the copies are read or one is written. A reset sets it to 1 itself, and the first
+ *   instructions of reset_handler() (startup.c) to 0 again, so that a further reset finds the copies, too.
  * Source   README.md, reset; reference manual, SRAM retention
  * Errors   retained_read(): false after a power-on, or when no copy is intact
  * Context  retained_read(): start-up, once; retained_write(): 1 kHz task, then */

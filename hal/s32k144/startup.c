@@ -115,18 +115,28 @@ __attribute__((used)) void start_up(void)
     panic();
 }
 
-/* All RAM in use is written in whole words before any of it is read or written in part, because until then its error
- * correction codes are undefined: the stack here, with the pattern from which the high-water mark is found, and the
- * rest by clear_and_copy(). */
+/* First, what must outlast a reset is kept again (retained.h), because the next reset may come before it has been read.
+ *
+ * All RAM in use is written in whole words before any of it is read or written in part, because until then its error
+ * correction codes are undefined: the stack here, four words at a time as in clear_and_copy(), with the pattern from
+ * which the high-water mark is found; the rest there. */
 __attribute__((naked)) void reset_handler(void)
 {
-    __asm__ volatile("ldr r0, =stack_bottom\n"
+    __asm__ volatile("ldr r0, =%c1\n"
+                     "ldr r1, [r0]\n"
+                     "bic r1, r1, %2\n"
+                     "str r1, [r0]\n"
+                     "ldr r0, =stack_bottom\n"
                      "ldr r1, =stack_top\n"
                      "ldr r2, =%c0\n"
-                     "1: str r2, [r0], #4\n"
+                     "mov r3, r2\n"
+                     "mov r4, r2\n"
+                     "mov r5, r2\n"
+                     "1: stmia r0!, {r2, r3, r4, r5}\n"
                      "cmp r0, r1\n"
                      "blo 1b\n"
-                     "b start_up\n" ::"i"(STACK_PATTERN));
+                     "b start_up\n" ::"i"(STACK_PATTERN),
+                     "i"(&SIM->CHIPCTL), "i"(SIM_CHIPCTL_SRAMU_RETEN));
 }
 
 #define EXTERNAL(irq) (16 + (irq))

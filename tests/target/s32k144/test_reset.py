@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from random import Random
 
@@ -17,19 +18,24 @@ import resets
 from planting import PlantedError, assert_found
 
 from fluxtrue_tools.bench.build import have_arm_compiler
+from fluxtrue_tools.bench.image import Stand
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.build import Parts
 from fluxtrue_tools.emulate.core import CENTRE, LIMIT, Core, State
+from fluxtrue_tools.sim.library import Loop
 
 POINTS = 10
 WITHOUT_GATES_MS = 2.0
-LATER_MS = {"sincos": 4.4, "windings": 5.4}  # measured: docs/theory/safe-state.md
+LATER_MS = {"sincos": 4.3, "windings": 5.3}  # measured: docs/theory/safe-state.md
 STEP_PERIODS = 10  # in 1 ms
 VDC_SHARE = 1.2
 FIRST_WATCHDOG_S = 0.1
 COPIES = 0x2000_0000  # of the state, hal/s32k144/retained.c
 COPY_BYTES = 40
-SRAMU_RETEN = 20  # SIM_CHIPCTL
+SEQUENCE = 4  # its place in a copy
+# Periods between two resets: before the copies are read; before the short circuit; while it is held and nothing has
+# been written yet, twice; after the task's first write.
+FURTHER_RESETS = ((1,), (10,), (50, 50), (230,))
 SAFE_STATE = 6  # of port C, hal/s32k144/pins.h
 HELD = 0x2A3F  # FTM0.SWOCTRL: the short circuit
 LOWER, NO_OUTPUTS = 0b10_1010, 0
@@ -180,6 +186,48 @@ def test_a_damaged_copy_is_not_used(parts: Parts, damaged: tuple[int, ...]) -> N
     assert math.isnan(outcome.without_gates_ms) == (len(damaged) == 2)
 
 
+def sequences(core: Core) -> list[int]:
+    return [int.from_bytes(core.read(COPIES + COPY_BYTES * k + SEQUENCE, 4), "little") for k in range(2)]
+
+
+def again(loop: Loop, stand: Stand, spacing: tuple[int, ...]) -> resets.Outcome:
+    """A reset by the watchdog before each of these numbers of periods, and after the last one by the pin."""
+    for periods in spacing:
+        loop.set("emulator.reset_share", 0.3)
+        loop.set("emulator.reset", resets.KINDS["watchdog"])
+        loop.run(periods)
+    return resets.reset(loop, stand, "pin", 60.0, 0.3, hardware=True)
+
+
+def further_resets_find_the_copies(parts: Parts) -> None:
+    """Each reset withdraws that the RAM is kept, and the task writes its first copy 20 ms later."""
+    loop, stand = resets.powered_up(parts)
+    with loop:
+        stand.run(60, TorqueRequested=60.0)
+        for spacing in FURTHER_RESETS:
+            holds(resets.in_a_copy(partial(again, loop, stand, spacing)))
+
+
+def test_further_resets_find_the_copies(parts: Parts) -> None:
+    further_resets_find_the_copies(parts)
+
+
+def test_the_task_continues_the_copies_after_two_resets(parts: Parts) -> None:
+    """Both are as they were until it writes the older one, with the next number."""
+    loop, stand = resets.powered_up(parts)
+    with loop:
+        core = stand.core
+        core.reset(resets.KINDS["watchdog"])
+        kept, numbers = core.read(COPIES, 2 * COPY_BYTES), sequences(core)
+        for _ in range(2):
+            core.run(5e-3)
+            assert core.read(COPIES, 2 * COPY_BYTES) == kept
+            core.reset(resets.KINDS["watchdog"])
+        while sequences(core) == numbers:
+            core.run(1e-4)
+        assert sorted(sequences(core)) == [max(numbers), max(numbers) + 1]
+
+
 def copies_of_an_earlier_power_on_are_not_used(parts: Parts) -> None:
     """A short power-off leaves them in the RAM, and the next reset comes when the task has written one of the two."""
     loop, stand = resets.powered_up(parts)
@@ -187,7 +235,7 @@ def copies_of_an_earlier_power_on_are_not_used(parts: Parts) -> None:
         core, kept = stand.core, stand.core.read(COPIES, 2 * COPY_BYTES)
         core.reset(resets.KINDS["power-on"])
         core.write(COPIES, kept)
-        while core.register("SIM.CHIPCTL") >> SRAMU_RETEN & 1:  # until the first copy is written
+        while sequences(core)[0] != 0:  # until the first copy is written
             core.run(1e-4)
         core.reset(resets.KINDS["pin"])
         core.run(5e-3)
@@ -244,6 +292,14 @@ PLANTED_ERRORS: dict[str, tuple[Callable[[Parts], None], PlantedError]] = {
     "the retained RAM is written": (
         four_resets_stay_within_the_bounds,
         PlantedError("retained.c", "    SIM->CHIPCTL = SIM->CHIPCTL | SIM_CHIPCTL_SRAMU_RETEN;\n", ""),
+    ),
+    "the RAM is not retained from its reading on": (
+        further_resets_find_the_copies,
+        PlantedError("retained.c", "    keep_copies();\n    return is_valid;\n", "    return is_valid;\n"),
+    ),
+    "the RAM is not retained until its reading": (
+        further_resets_find_the_copies,
+        PlantedError("startup.c", r'"bic r1, r1, %2\n"', r'""'),
     ),
     "copies stay in the RAM at power-on": (
         copies_of_an_earlier_power_on_are_not_used,
