@@ -52,7 +52,7 @@ static bool is_flux_known(const drive_t *drive, const sample_t *sample)
 }
 
 /* The flux in every second period only: its sum has no need of every period, the direction of a current has. Not
- * inlined: beside its code, that of the search for a shorted switch, in the longest fast ISR, has too few registers. */
+ * inlined: that would take registers from the search for a shorted switch, which the longest fast ISR contains. */
 static FX_NOT_INLINED open_switch_t search(drive_t *drive, const safe_period_t *now)
 {
     const motor_t *m = drive->motor;

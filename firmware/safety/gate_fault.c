@@ -5,7 +5,7 @@
 #include "signal/debounce.h"
 
 #define QUIET_STEPS 50
-#define WRONG_ZEROS 4 /* times i_alive: what the zeros of two sensors may make */
+#define WRONG_ZEROS 4 /* times i_alive: what two zeros that are wrong against each other may make */
 #define REST 16 /* q15: e at rest without dc voltage, 0.25 V where V_b is 500 V */
 
 static bool is_beyond_offset(const gate_fault_config_t *config, const gate_fault_in_t *in, int32_t length)
@@ -13,9 +13,8 @@ static bool is_beyond_offset(const gate_fault_config_t *config, const gate_fault
     return !in->gates && in->currents_valid && length > config->i_alive + 2 * in->zero;
 }
 
-/* A current that flows although switching is disabled and the dc link has opposed it for long enough (SS-10). Without a
- * report of the drivers it must be more than the zeros of two sensors make that are wrong against each other (SS-32).
- */
+/* A current that flows although switching is disabled and the dc link has opposed it for long enough (SS-10). Unless a
+ * gate fault is latched, it must be more than two zeros that are wrong against each other make (SS-32). */
 static bool is_switch_shorted(const gate_fault_config_t *config, gate_fault_state_t *state, const gate_fault_in_t *in,
                               int32_t length)
 {
@@ -23,8 +22,8 @@ static bool is_switch_shorted(const gate_fault_config_t *config, gate_fault_stat
     const bool flows = is_beyond_offset(config, in, length) && !in->rectifies;
     state->opposed = flows ? fx_min_s32(opposed, config->volt_steps) : 0;
     const bool outlasts = state->opposed == config->volt_steps;
-    const bool certain = in->latched || length > WRONG_ZEROS * config->i_alive;
-    return (outlasts && certain) || (state->switch_shorted && (outlasts || in->latched));
+    const bool certain = state->switch_shorted || in->latched || length > WRONG_ZEROS * config->i_alive;
+    return (outlasts && certain) || (state->switch_shorted && in->latched);
 }
 
 /* Contactor and gate supply may be switched off: at rest, or if no switch is shorted, which a turning machine without

@@ -9,8 +9,8 @@
  *   exceeds 1.5 sqrt(3) psi_b: the dc link ends any current of the windings sooner, so a switch is shorted.
  *   That is a gate fault, too, and needs the short circuit until the faults are reset. i_0, the mean of the measured
  *   phases, excludes the offset of one sensor, which looks like a current of 2 |i_0|. Zeros of two sensors that are
- *   wrong against each other have no mean. Unless the drivers have reported a fault, the current must therefore also
- *   exceed 4 i_alive.
+ *   wrong against each other have no mean. Unless a gate fault is latched already, the current must therefore also
+ *   exceed 4 i_alive in such a step.
  *   Contactor and gate supply may be switched off with a gate fault when the machine is at rest (e <= v_dc/64), or when
  *   no switch is shorted and no current above i_alive was measured for 50 steps with switching disabled.
  * Source   docs/theory/safe-state.md (SS-9), (SS-10), (SS-32)
@@ -47,7 +47,7 @@ typedef struct {
     dq_q15_t i;
 } gate_fault_in_t;
 
-/** Whether a current above the measuring error flows although switching is disabled. */
+/** Whether a current above the error of one sensor flows although switching is disabled. */
 bool gate_fault_current_flows(const gate_fault_config_t *config, const gate_fault_in_t *in);
 
 /** Whether a gate fault needs the short circuit now, or would need it. */

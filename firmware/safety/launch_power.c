@@ -14,7 +14,7 @@
 #define EARLY_STEPS 16 /* after the means have settled: with noise, m_0 becomes a mean over EARLY_SHIFT */
 #define EARLY_SHIFT 3
 #define NOISE_SHIFT 4
-#define STANDING_STEPS 32 /* without a movement of the reference: it stands */
+#define STANDING_STEPS 32 /* without a movement by i_0: the reference stands */
 #define SLOW_STEPS 4      /* between two movements of a reference that is followed */
 #define HALF_ROOT_Q8 181
 #define VAGUE_Q8 384 /* r_0 of 1.5 thresholds */
@@ -93,7 +93,8 @@ static void update_noise(const launch_power_config_t *config, launch_power_state
     state->first_noise_q8 = settled ? mean_step(state->first_noise_q8, of_first_q8, shift) : state->noise_q8;
 }
 
-/* After a reference that has moved far, r_0 may be much more than noise: a comparison that begins anew finds less. */
+/* r_0 may be much more than noise after a reference that has moved far, or where much noise has ceased: a comparison
+ * that begins anew has a lower threshold. */
 static bool is_vague(const launch_power_state_t *state, int32_t loss_max)
 {
     return state->first_noise_q8 > fx_max_s32(2 * state->noise_q8, VAGUE_Q8 * loss_max);

@@ -54,12 +54,12 @@ typedef struct {
 
 typedef struct {
     bool acting;
-    dq_q15_t u, i, psi; /* acting voltage, current and the tables' flux there */
-    dq_q15_t u_mean;    /* acting voltage, mean of the last step; u if there is none */
-    q15_t omega;        /* tracked: lags behind the rotor */
-    q15_t torque;       /* commanded, as the closed loop follows it */
-    winding_resistance_t r;
-    q15_t current; /* magnitude of i */
+    dq_q15_t u, i, psi;     /* acting voltage, current and the tables' flux there */
+    dq_q15_t u_mean;        /* acting voltage, mean of the last step; u if there is none */
+    q15_t omega;            /* tracked: lags behind the rotor */
+    q15_t torque;           /* commanded, as the closed loop follows it */
+    winding_resistance_t r; /* torque_monitor_resistance() of this step */
+    q15_t current;          /* magnitude of i */
 } torque_monitor_in_t;
 
 /** (MN-32); a reading beyond the range of the winding's temperature counts as the end of the range. */

@@ -382,6 +382,7 @@ def test_a_planted_wait_by_the_clock_is_found(tree: Path, path: str, line: str, 
         ("tests/live/CMakeLists.txt", "set_tests_properties(x PROPERTIES RUN_SERIAL TRUE)", "RUN_SERIAL"),
         ("tests/tools/wait.sh", "sleep 1", "sleep"),
         ("tests/pytest.ini", "faulthandler_timeout = 300", "faulthandler_timeout ="),
+        ("tests/pytest.ini", "addopts = -q --timeout=9", "addopts = -q --timeout="),
     ],
 )
 def test_a_planted_wait_that_is_not_in_python_is_found(tree: Path, path: str, line: str, word: str) -> None:

@@ -26,7 +26,7 @@ HANG = "HANG_S"
 C_CLOCK = re.compile(r"\b(((nano|u)?sleep|clock_gettime|gettimeofday|alarm|setitimer)\s*\(|time\((NULL|0|&)|clock\(\))")
 CMAKE_TIME = re.compile(r"\b(TIMEOUT|COST|RUN_SERIAL)\b")
 # faulthandler_timeout of pytest: a thread reads the stacks of the others while they run on, and may crash the test.
-SETTING_CLOCK = re.compile(r"^\s*\w*timeout\w*\s*=")
+SETTING_CLOCK = re.compile(r"^[^#;]*?\b\w*timeout\w*\s*=")
 SCRIPT_CLOCK = re.compile(r"\b(sleep|setTimeout|setInterval|timeout)\b")
 
 

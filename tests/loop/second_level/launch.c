@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* A vehicle of 1600 kg that starts with a wrong angle: wheels of 0.32 m behind a gear of 9:1, 2 kg.m2 at the rotor.
- *   launch_wrong_angle [print]: the movement until a fault for all offsets and torques, against its bounds */
+ *   launch_wrong_angle [print]: the movement until a fault for all offsets, torques and pedals, against its bounds */
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>

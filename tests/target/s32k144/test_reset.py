@@ -235,8 +235,10 @@ def copies_of_an_earlier_power_on_are_not_used(parts: Parts) -> None:
         core, kept = stand.core, stand.core.read(COPIES, 2 * COPY_BYTES)
         core.reset(resets.KINDS["power-on"])
         core.write(COPIES, kept)
+        assert sequences(core)[0] != 0
         while sequences(core)[0] != 0:  # until the first copy is written
             core.run(1e-4)
+        core.run(1e-4)  # and complete
         core.reset(resets.KINDS["pin"])
         core.run(5e-3)
         assert core.register("FTM0.SWOCTRL") != HELD
