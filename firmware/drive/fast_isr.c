@@ -168,7 +168,7 @@ static inline FX_INLINED rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *
     const dq_q15_t measured = park_pair(sample->i_ab, rotation);
     sample->point.i = measured;
     const uint32_t ahead = (uint32_t)step + (uint32_t)(step >> 1);
-    const fx_pair_t advanced = drives ? fx_rotation(sample->theta_e + ahead) : 0;
+    const fx_pair_t advanced = drives ? fx_rotation(sample->theta_e + ahead) : 0U;
     sample->point.flux = flux_table_step(&drive->period.flux_table, measured);
     return (rotor_frame_t){fx_pair(measured.d, measured.q), rotation, advanced, sample->v_dc, step};
 }
