@@ -21,6 +21,7 @@ LAYERS = ("fx", "signal", "control", "safety", "second_level")
 DIVISIONS = {
     "div.c": 2,  # all at 1 kHz
     "current_reference.c": 1,
+    "launch_power.c": 1,  # 1 kHz, when a reference that moves slowly has moved by i_0
     "identify.c": 1,
     "schedule.c": 1,
     "capture.c": 2,  # 1 kHz, armed: rows of a step, and the place of the first
