@@ -42,8 +42,8 @@ void short_circuit_prepare(fast_state_t *fast, uint32_t periods);
 /** Whether switching stays disabled in this period, before the short circuit; called once per period. */
 bool short_circuit_waits(fast_state_t *fast);
 
-/** The same with what may end the wait: the search for a shorted switch, or a small flux. Called once
- * per period of a fault in place of short_circuit_waits(). */
+/** The same with what may end the wait: the search for a shorted switch, or a small flux. Called once per
+ * period of a fault in place of short_circuit_waits(). */
 bool short_circuit_may_begin(drive_t *drive, const safe_period_t *now);
 
 /** Ends the short circuit: switching is disabled, and the duties are one half. */

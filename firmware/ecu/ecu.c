@@ -188,7 +188,7 @@ static void service_watchdog(ecu_t *ecu)
     }
 }
 
-/* In four of ten steps no frame is due, and nothing is collected for one. */
+/* In four of ten steps no frame is due, and nothing is collected. Not inlined: telemetry would deepen the stack. */
 static FX_NOT_INLINED void send_frames(ecu_t *ecu)
 {
     telemetry_t telemetry;

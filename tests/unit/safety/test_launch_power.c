@@ -692,20 +692,20 @@ void test_no_followed_movement_wraps(void)
     launch_power_config_t longest = config;
     longest.periods = 40;
     for (unsigned n = 0; n < 32; n++) {
-        const bool both = (n >> 3 & 1U) != 0U; /* axes: a vector of full length, too */
-        const int32_t from = (n & 1U) ? 820 : (both ? 22700 : 32357), sign = (n >> 1 & 1U) ? 1 : -1;
-        const int32_t first = (n >> 2 & 1U) ? end : -end, change = (n >> 4 & 1U) ? moved : -moved;
+        const int32_t q = (int32_t)(n >> 3 & 1U); /* 1: both axes, a vector of full length, too */
+        const int32_t from = (n & 1U) ? 820 : ((q != 0) ? 22700 : 32357), to = from + ((n >> 4 & 1U) ? moved : -moved);
+        const int32_t first = (n >> 2 & 1U) ? end : -end, sign = (n >> 1 & 1U) ? 1 : -1;
         state = (launch_power_state_t){.power_q8 = first,
                                        .first_power_q8 = first,
-                                       .i_ref = {(q15_t)(sign * from), (q15_t)(both ? from : 0)},
+                                       .i_ref = {(q15_t)(sign * from), (q15_t)(q * from)},
                                        .steady = SETTLED + EARLY,
                                        .since = 4};
         in = (launch_power_in_t){.acting = true,
                                  .measured = true,
                                  .u_standing = {sign * 43 * 32767, 43 * 32767},
-                                 .i_ref = {sign * (from + change), both ? from + change : 0},
+                                 .i_ref = {sign * to, q * to},
                                  .r = {16383, 16383}};
-        const double before = hypot(from, both ? from : 0), now = hypot(in.i_ref.d, in.i_ref.q);
+        const double before = hypot(from, q * from), now = hypot(to, q * to);
         const double loss_q8 = 16383.0 * now * (now - before) / 16777216.0 * 40.0;
         (void)launch_power_step(&longest, &state, &in);
         TEST_ASSERT_INT32_WITHIN(400000, (int32_t)lround(first * (now / before) + loss_q8), state.first_power_q8);
