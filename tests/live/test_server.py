@@ -449,6 +449,46 @@ def test_in_step_time_waits_for_a_page_and_until_each_page_has_drawn(tmp_path: P
     serve(Drive(), tmp_path, talk, in_step)
 
 
+def test_in_step_no_time_passes_between_the_failure_of_a_connection_and_the_end_of_its_page(tmp_path: Path) -> None:
+    """The server notices first that it cannot send, and then that the page has closed, which ends the torque."""
+    failed = asyncio.Event()
+
+    class Counting(InStep):
+        """Counts how often time was let go on."""
+
+        turns = 0
+
+        def done(self) -> None:
+            self.turns += 1
+            super().done()
+
+    class Failed:
+        """A viewer whose connection is lost."""
+
+        async def send_str(self, _text: str) -> None:
+            failed.set()
+            raise ConnectionResetError
+
+        async def close(self, **_: Any) -> None:
+            """Do nothing: there is no connection."""
+
+    async def talk(client: TestClient[Any, Any], session: Session) -> None:
+        socket = await page(client)
+        session.viewers.append(Failed())  # type: ignore[arg-type]
+        passing = asyncio.get_running_loop().run_in_executor(None, in_step.turn)
+        await socket.send_json({"type": "drawn", "batch": 0, "visible": True})
+        await failed.wait()
+        await obeyed(socket)
+        assert in_step.turns == 0
+        session.viewers.pop()  # what the handler does at its end
+        session.changed.set()
+        await passing
+        assert in_step.turns == 1
+
+    in_step = Counting()
+    serve(Drive(), tmp_path, talk, in_step)
+
+
 def test_it_listens_on_the_loopback_address_only() -> None:
     with _listen(0) as listener:
         assert listener.getsockname()[0] == "127.0.0.1"

@@ -144,18 +144,16 @@ def _batch(session: Session, number: int) -> dict[str, Any]:
     return batch
 
 
-async def _send(session: Session, viewer: web.WebSocketResponse, text: str) -> bool:
-    """Send a batch to one page; whether the page has accepted it."""
+async def _send(session: Session, viewer: web.WebSocketResponse, text: str) -> None:
+    """Send a batch to one page. A page that does not accept it is late or has disconnected."""
     try:
-        await asyncio.wait_for(viewer.send_str(text), session.wall_s(SEND_S))
-    except (ConnectionError, RuntimeError, TimeoutError):
-        return False
+        with contextlib.suppress(ConnectionError, RuntimeError, TimeoutError):
+            await asyncio.wait_for(viewer.send_str(text), session.wall_s(SEND_S))
     finally:
         del session.sending[viewer]
-    return True
 
 
-def _begin_batch(session: Session, number: int) -> dict[web.WebSocketResponse, asyncio.Task[bool]]:
+def _begin_batch(session: Session, number: int) -> dict[web.WebSocketResponse, asyncio.Task[None]]:
     """Begin to send a batch to every page that has accepted the one before: a page that does not read delays none."""
     rows, begun = json.dumps(_batch(session, number)).removesuffix("}"), {}
     for viewer in session.viewers:
@@ -166,8 +164,10 @@ def _begin_batch(session: Session, number: int) -> dict[web.WebSocketResponse, a
 
 
 async def _send_batch(session: Session, number: int) -> list[web.WebSocketResponse]:
-    """Send a batch to every page; the result is the set of pages that accepted it."""
-    return [viewer for viewer, sent in _begin_batch(session, number).items() if await sent]
+    """Send a batch to every page; the result is the pages to which it was sent."""
+    begun = _begin_batch(session, number)
+    await asyncio.gather(*begun.values())
+    return list(begun)
 
 
 async def _broadcast(session: Session) -> None:
@@ -177,13 +177,17 @@ async def _broadcast(session: Session) -> None:
 
 
 async def _broadcast_in_step(session: Session, in_step: InStep) -> None:
-    """Send the batches in step with simulated time, which stops while no page is connected."""
+    """Send the batches in step with simulated time, which stops while no page is connected.
+
+    A page whose connection has failed is waited for until its handler has ended: only the end of the handler ends the
+    request to drive, and no simulated time may pass before.
+    """
     number = 0
     while await asyncio.to_thread(in_step.due):
         while not session.viewers:
             await _change(session)
-        taken = await _send_batch(session, number)
-        while any(viewer in session.viewers and session.drawn.get(viewer, -1) < number for viewer in taken):
+        pages = await _send_batch(session, number)
+        while any(viewer in session.viewers and session.drawn.get(viewer, -1) < number for viewer in pages):
             await _change(session)
         in_step.done()
         number += 1

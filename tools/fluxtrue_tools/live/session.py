@@ -47,7 +47,7 @@ class Session:
     in_step: InStep | None = None  # simulated time waits for the pages
     viewers: list[web.WebSocketResponse] = field(default_factory=list)
     drawn: dict[web.WebSocketResponse, int] = field(default_factory=dict)  # number of the last batch, page by page
-    sending: dict[web.WebSocketResponse, asyncio.Task[bool]] = field(default_factory=dict)  # under way, page by page
+    sending: dict[web.WebSocketResponse, asyncio.Task[None]] = field(default_factory=dict)  # under way, page by page
     changed: asyncio.Event = field(default_factory=asyncio.Event)  # a page has connected, drawn or disconnected
     hand: web.WebSocketResponse | None = None  # the page that has control
     status_sent: Status | None = None  # what the pages know
