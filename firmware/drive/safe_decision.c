@@ -23,7 +23,7 @@ static gate_fault_in_t gate_fault_inputs(const drive_t *drive, const snapshot_t 
         .line_emf = safe->line_emf,
         .v_dc = (q15_t)snapshot->sample.v_dc,
         .zero = drive_mean_of_phases(&snapshot->sample),
-        .i = snapshot->sample.point.i,
+        .i_magnitude = snapshot->i_magnitude,
     };
 }
 

@@ -22,7 +22,6 @@
 #include <stdint.h>
 
 #include "fx/q.h"
-#include "types/frames.h"
 
 typedef struct {
     q15_t i_alive;      /* a phase current above this is not a measuring error */
@@ -43,8 +42,8 @@ typedef struct {
     bool rectifies; /* the diodes of an intact bridge may conduct (safety/safe_state.h) */
     bool currents_valid;
     q15_t line_emf, v_dc;
-    int32_t zero; /* mean of the three phases, magnitude, q15 */
-    dq_q15_t i;
+    int32_t zero;      /* mean of the three phases, magnitude, q15 */
+    q15_t i_magnitude; /* of the current vector */
 } gate_fault_in_t;
 
 /** Whether a current above the error of one sensor flows although switching is disabled. */

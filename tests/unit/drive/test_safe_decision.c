@@ -73,7 +73,7 @@ void test_only_a_current_that_the_dc_link_opposes_shows_a_shorted_switch(void)
                  {201, 100, false, true}};
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         setUp();
-        snapshot.sample.point.i.q = alive + cases[n].i_above;
+        snapshot.i_magnitude = (q15_t)(alive + cases[n].i_above);
         snapshot.sample.zero_q28 = cases[n].mean * 8192;
         drive.task.safe_state.rectifies = cases[n].rectifies;
         (void)step();

@@ -48,11 +48,11 @@ void test_above_an_eighth_of_the_dc_voltage_a_gate_fault_needs_the_short_circuit
 /* The dc voltage opposes 0.667 V_b T per step without back-EMF, and 0.167 with a back-EMF of 0.5 V_b: 4 steps. */
 void test_a_current_that_outlasts_the_flux_of_the_windings_is_a_shorted_switch(void)
 {
-    in.i = (dq_q15_t){-8000, 0};
+    in.i_magnitude = 8000;
     (void)steps(1);
     TEST_ASSERT_TRUE(state.switch_shorted);
     setUp();
-    in.i = (dq_q15_t){0, 8000};
+    in.i_magnitude = 8000;
     in.line_emf = 16384;
     (void)steps(3);
     TEST_ASSERT_FALSE(state.switch_shorted);
@@ -64,19 +64,19 @@ void test_a_current_that_outlasts_the_flux_of_the_windings_is_a_shorted_switch(v
  * shorted switch only if the drivers have reported one. */
 void test_zeros_that_are_wrong_against_each_other_are_no_shorted_switch(void)
 {
-    in.i = (dq_q15_t){0, 4 * 1966};
+    in.i_magnitude = 4 * 1966;
     (void)steps(30000);
     TEST_ASSERT_FALSE(state.switch_shorted);
-    in.i.q++;
+    in.i_magnitude++;
     (void)steps(1);
     TEST_ASSERT_TRUE(state.switch_shorted);
-    in.i.q = 2000; /* not latched yet */
+    in.i_magnitude = 2000; /* not latched yet */
     (void)steps(1);
     TEST_ASSERT_TRUE(state.switch_shorted);
-    in.i.q = 1966;
+    in.i_magnitude = 1966;
     (void)steps(1);
     TEST_ASSERT_FALSE(state.switch_shorted);
-    in.i.q = 2000;
+    in.i_magnitude = 2000;
     (void)steps(30000);
     TEST_ASSERT_FALSE(state.switch_shorted);
     in.latched = true;
@@ -87,12 +87,12 @@ void test_zeros_that_are_wrong_against_each_other_are_no_shorted_switch(void)
 void test_other_causes_of_a_current_are_no_shorted_switch(void)
 {
     const gate_fault_in_t not_found[] = {
-        {.v_dc = V_DC, .currents_valid = true, .i = {1966, 0}},                      /* no current */
-        {.v_dc = V_DC, .currents_valid = true, .i = {9000, 0}, .gates = true},       /* the bridge conducts */
-        {.v_dc = V_DC, .currents_valid = false, .i = {9000, 0}},                     /* the sensors are wrong */
-        {.v_dc = V_DC, .currents_valid = true, .i = {9000, 0}, .rectifies = true},   /* the diodes conduct */
-        {.v_dc = 9000, .line_emf = 9000, .currents_valid = true, .i = {9000, 9000}}, /* the dc voltage is too low */
-        {.v_dc = -50, .line_emf = 0, .currents_valid = true, .i = {9000, 9000}},
+        {.v_dc = V_DC, .currents_valid = true, .i_magnitude = 1966},                    /* no current */
+        {.v_dc = V_DC, .currents_valid = true, .i_magnitude = 9000, .gates = true},     /* the bridge conducts */
+        {.v_dc = V_DC, .currents_valid = false, .i_magnitude = 9000},                   /* the sensors are wrong */
+        {.v_dc = V_DC, .currents_valid = true, .i_magnitude = 9000, .rectifies = true}, /* the diodes conduct */
+        {.v_dc = 9000, .line_emf = 9000, .currents_valid = true, .i_magnitude = 12728}, /* the dc voltage is too low */
+        {.v_dc = -50, .line_emf = 0, .currents_valid = true, .i_magnitude = 12728},
     };
     for (unsigned n = 0; n < sizeof not_found / sizeof not_found[0]; n++) {
         setUp();
@@ -105,11 +105,11 @@ void test_other_causes_of_a_current_are_no_shorted_switch(void)
 /* An offset of one sensor makes a vector of twice the mean of the phases. 2000 on top of it are a current. */
 void test_the_offset_of_a_current_sensor_is_no_shorted_switch(void)
 {
-    in.i = (dq_q15_t){0, 3000};
+    in.i_magnitude = 3000;
     in.zero = 1500;
     (void)steps(1000);
     TEST_ASSERT_FALSE(state.switch_shorted);
-    in.i = (dq_q15_t){0, 5000};
+    in.i_magnitude = 5000;
     in.latched = true;
     (void)steps(1);
     TEST_ASSERT_TRUE(state.switch_shorted);
@@ -119,16 +119,16 @@ void test_a_gap_in_the_current_restarts_the_sum(void)
 {
     in.line_emf = 10923; /* 0.333 V_b T per step: 2 steps suffice */
     for (int k = 0; k < 100; k++) {
-        in.i = (dq_q15_t){0, k % 2 == 0 ? 9000 : 0};
+        in.i_magnitude = k % 2 == 0 ? 9000 : 0;
         (void)steps(1);
         TEST_ASSERT_FALSE(state.switch_shorted);
     }
-    in.i = (dq_q15_t){0, 9000};
+    in.i_magnitude = 9000;
     (void)steps(2);
     TEST_ASSERT_TRUE(state.switch_shorted);
     setUp();
     (void)steps(1);
-    in.i = (dq_q15_t){0, 9000};
+    in.i_magnitude = 9000;
     in.line_emf = (q15_t)(V_DC - (config.volt_steps - 1) / 2); /* 2 steps are one count short of the sum */
     (void)steps(2);
     TEST_ASSERT_FALSE(state.switch_shorted);
@@ -140,11 +140,11 @@ void test_a_gap_in_the_current_restarts_the_sum(void)
  * and without the current of the short circuit. */
 void test_a_shorted_switch_needs_the_short_circuit_until_the_fault_is_reset(void)
 {
-    in.i = (dq_q15_t){9000, 0};
+    in.i_magnitude = 9000;
     TEST_ASSERT_TRUE(steps(2));
     in.latched = in.gates = true;
     TEST_ASSERT_TRUE(steps(1000));
-    in.i = (dq_q15_t){0, 0};
+    in.i_magnitude = 0;
     TEST_ASSERT_TRUE(steps(1000));
     in.latched = false;
     TEST_ASSERT_FALSE(steps(1));
@@ -167,15 +167,15 @@ void test_with_a_gate_fault_the_supply_is_held_until_no_switch_is_shorted_or_the
     TEST_ASSERT_TRUE(state.holds_supply);
     (void)steps(1);
     TEST_ASSERT_FALSE(state.holds_supply);
-    in.i = (dq_q15_t){9000, 0};
+    in.i_magnitude = 9000;
     (void)steps(1);
     TEST_ASSERT_TRUE(state.holds_supply);
-    in.i = (dq_q15_t){config.i_alive, 0}; /* no current, and all 50 steps again */
+    in.i_magnitude = config.i_alive; /* no current, and all 50 steps again */
     (void)steps(49);
     TEST_ASSERT_TRUE(state.holds_supply);
     (void)steps(1);
     TEST_ASSERT_FALSE(state.holds_supply);
-    in.i = (dq_q15_t){9000, 0};
+    in.i_magnitude = 9000;
     (void)steps(1);
     TEST_ASSERT_TRUE(state.holds_supply);
     in.line_emf = V_DC / 64;
@@ -197,10 +197,10 @@ void test_with_a_gate_fault_the_supply_is_held_until_no_switch_is_shorted_or_the
 
 void test_a_shorted_switch_holds_the_supply_however_long_no_current_flows(void)
 {
-    in.i = (dq_q15_t){9000, 0};
+    in.i_magnitude = 9000;
     (void)steps(2);
     in.latched = true;
-    in.i = (dq_q15_t){0, 0};
+    in.i_magnitude = 0;
     in.line_emf = 1000;
     (void)steps(1000);
     TEST_ASSERT_TRUE(state.holds_supply);
@@ -211,7 +211,7 @@ void test_an_offset_delays_the_release_of_the_supply(void)
 {
     in.latched = true;
     in.line_emf = 1000;
-    in.i = (dq_q15_t){0, 3000};
+    in.i_magnitude = 3000;
     in.zero = 1500;
     (void)steps(1000);
     TEST_ASSERT_FALSE(state.switch_shorted);
