@@ -811,6 +811,32 @@ static void raise_voltage(void)
     seam_period();
 }
 
+/* The two samples before the present one count, not an older one. */
+void test_a_higher_voltage_before_the_rise_does_not_delay_the_over_voltage(void)
+{
+    seam_run();
+    seam_periods(3);
+    seam_voltage(400.0);
+    seam_period();
+    seam_voltage(350.0);
+    seam_period();
+    raise_voltage();
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_VOLTAGE, drive.fast.faults);
+}
+
+/* The over-voltage that the rise announces does not replace what the monitors find in the same sample. */
+void test_an_over_current_in_the_sample_of_the_over_voltage_is_a_fault_too(void)
+{
+    seam_run();
+    seam_periods(3);
+    seam_voltage(400.0);
+    seam_period();
+    seam_voltage(450.0);
+    seam_current(310.0, -155.0, -155.0);
+    seam_period();
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT | FAULT_OVER_VOLTAGE, drive.fast.faults);
+}
+
 static void run_until_over_voltage_shorts(void)
 {
     seam_run();
