@@ -39,14 +39,17 @@ static bool is_near_priors(const identify_record_t *identified)
     return distance_q26 <= DISTANCE_MAX_Q26;
 }
 
-/* Accepts half to twice the dead time and device drop of motor.toml, and a knee that commissioning could have found. */
+/* Accepts dead time and device drop within half of motor.toml's, or within DUTY_MARGIN if these are small, and a knee
+ * that commissioning could have found: nothing confirms the compensation before it acts. */
 static bool is_near_bridge(const motor_t *m, const compensation_t *compensation)
 {
     const float duty = (float)compensation->dead_time * LSB_Q15;
+    const float half = 0.5F * m->bridge_duty;
+    const float range = (half > DUTY_MARGIN) ? half : DUTY_MARGIN;
     const int32_t knee_q17 = m->parameters.modulate.knee_q17;
     return compensation->measured == 0 ||
-           (duty <= 2.0F * m->bridge_duty + DUTY_MARGIN && duty >= 0.5F * m->bridge_duty - DUTY_MARGIN &&
-            compensation->knee_q17 <= knee_q17 && compensation->knee_q17 >= knee_q17 / COMPENSATION_KNEE_RANGE);
+           (duty <= m->bridge_duty + range && duty >= m->bridge_duty - range && compensation->knee_q17 <= knee_q17 &&
+            compensation->knee_q17 >= knee_q17 / COMPENSATION_KNEE_RANGE);
 }
 
 /* Takes all of the record or, if the drive refuses a part of it, nothing. */

@@ -24,6 +24,8 @@ MOVED_NM: Final = 2.0
 POINTS: Final = ((600, 60, 0.7), (1500, -50, 0.5), (3000, 100, 0.6), (1200, 80, 0.4), (6000, 40, 0.5))  # rpm, N·m, s
 DRIVEN: Final = ((1500, 50), (2500, 20), (600, -40), (3000, 70), (4500, 30), (1200, -60), (5000, 60), (2000, 90))
 
+BRIDGE, KNEE = 749, 1 << 26  # dead time with device drop, Q15, and knee, Q17, of hsm1: its motor_tables.c
+
 Record = tuple[list[int], list[int], list[int]]  # states, variances, compensation and trim
 
 
@@ -135,6 +137,11 @@ def campaign(motor: Motor, rounds: int, seed: int) -> list[tuple[str, bool, floa
 
 
 @pytest.fixture(scope="module")
+def honest(hsm1: Motor) -> bytes:
+    return memory_after(hsm1)
+
+
+@pytest.fixture(scope="module")
 def found(hsm1: Motor) -> list[tuple[str, bool, float]]:
     return campaign(hsm1, 44, 1)
 
@@ -142,3 +149,16 @@ def found(hsm1: Motor) -> list[tuple[str, bool, float]]:
 def test_no_forged_record_moves_the_torque(found: list[tuple[str, bool, float]]) -> None:
     assert len(found) >= 300
     assert [row for row in found if row[2] > MOVED_NM] == []
+
+
+@pytest.mark.parametrize("share", [0.4, 0.51, 1.49, 2.0])
+@pytest.mark.parametrize("trim", [-1000, 0, 1000])
+def test_a_compensation_near_the_ends_of_its_range_is_refused_or_moves_no_torque(
+        hsm1: Motor, honest: bytes, share: float, trim: int) -> None:  # fmt: skip
+    x, p, _ = content(honest)
+    recalled, error = torques(hsm1, forged(honest, (x, p, [round(share * BRIDGE), KNEE, 1, trim])))
+    assert recalled == (0.5 < share < 1.5)
+    if recalled:
+        _, fresh = torques(hsm1, None)
+        _, tables = torques(hsm1, None, loops=0.0)
+        assert (error - np.maximum(fresh, tables)).max() <= MOVED_NM

@@ -319,12 +319,12 @@ void test_a_failed_write_is_counted_and_tried_again_after_the_interval(void)
 
 void test_a_measured_compensation_is_kept_with_its_voltage_margin(void)
 {
-    const compensation_t measured = {dead_time(&drive.parameters) + 1000, drive.parameters.modulate.knee_q17 / 2, 1};
+    const compensation_t measured = {dead_time(&drive.parameters) + 300, drive.parameters.modulate.knee_q17 / 2, 1};
     TEST_ASSERT_TRUE(drive_compensate(&drive, &measured));
     identify_and_save();
     power_on(&motor);
     TEST_ASSERT_TRUE(memory.recalled);
-    TEST_ASSERT_EQUAL_INT(dead_time(&motor.parameters) + 1000, dead_time(&drive.parameters));
+    TEST_ASSERT_EQUAL_INT(dead_time(&motor.parameters) + 300, dead_time(&drive.parameters));
     TEST_ASSERT_EQUAL_INT32(motor.parameters.modulate.knee_q17 / 2, drive.parameters.modulate.knee_q17);
     TEST_ASSERT_INT32_WITHIN(1, motor.parameters.modulate.knee_side_q17 / 2, drive.parameters.modulate.knee_side_q17);
     TEST_ASSERT_LESS_THAN_UINT32(motor.parameters.current_control.clear_q30,
@@ -380,8 +380,8 @@ void test_the_bound_of_the_distance_is_exact(void)
     }
 }
 
-/* A record with this compensation on a machine whose inverter loses 2 % of the period: allowed are 0.22 % to 4.78 %,
- * which are 72 to 1566 counts. */
+/* A record with this compensation on a machine whose inverter loses 2 % of the period: allowed are 1 % to 3 %,
+ * which are 328 to 983 counts. */
 static bool recalls_with(float bridge_duty, int32_t dead_time_q15, q31_t knee_q17, int32_t measured)
 {
     static motor_t m;
@@ -399,27 +399,30 @@ static bool recalls(int32_t dead_time_q15, q31_t knee_q17, int32_t measured)
     return recalls_with(0.02F, dead_time_q15, knee_q17, measured);
 }
 
-/* Of 3.125 % of the period: 1/16 + 1/128 and 1/64 - 1/128, which are 2304 and 256 counts exactly. */
+/* Of 1/32 of the period: 3/2 and 1/2 of it, which are 1536 and 512 counts exactly; of 1/256: 1/128 more, 384 counts. */
 void test_the_bounds_of_a_measured_compensation_belong_to_what_is_used(void)
 {
     const q31_t knee = motor.parameters.modulate.knee_q17;
-    TEST_ASSERT_TRUE(recalls_with(0.03125F, 2304, knee, 1));
-    TEST_ASSERT_FALSE(recalls_with(0.03125F, 2305, knee, 1));
-    TEST_ASSERT_TRUE(recalls_with(0.03125F, 256, knee, 1));
-    TEST_ASSERT_FALSE(recalls_with(0.03125F, 255, knee, 1));
+    TEST_ASSERT_TRUE(recalls_with(0.03125F, 1536, knee, 1));
+    TEST_ASSERT_FALSE(recalls_with(0.03125F, 1537, knee, 1));
+    TEST_ASSERT_TRUE(recalls_with(0.03125F, 512, knee, 1));
+    TEST_ASSERT_FALSE(recalls_with(0.03125F, 511, knee, 1));
+    TEST_ASSERT_TRUE(recalls_with(0.00390625F, 384, knee, 1));
+    TEST_ASSERT_FALSE(recalls_with(0.00390625F, 385, knee, 1));
+    TEST_ASSERT_TRUE(recalls_with(0.00390625F, 0, knee, 1));
 }
 
 void test_a_measured_compensation_far_from_the_motor_data_is_not_used(void)
 {
     const q31_t knee = motor.parameters.modulate.knee_q17;
-    TEST_ASSERT_TRUE(recalls(1566, knee, 1));
-    TEST_ASSERT_FALSE(recalls(1567, knee, 1));
-    TEST_ASSERT_TRUE(recalls(72, knee, 1));
-    TEST_ASSERT_FALSE(recalls(71, knee, 1));
+    TEST_ASSERT_TRUE(recalls(983, knee, 1));
+    TEST_ASSERT_FALSE(recalls(984, knee, 1));
+    TEST_ASSERT_TRUE(recalls(328, knee, 1));
+    TEST_ASSERT_FALSE(recalls(327, knee, 1));
     TEST_ASSERT_FALSE(recalls(700, knee + 1, 1));
     TEST_ASSERT_TRUE(recalls(700, knee / COMPENSATION_KNEE_RANGE, 1));
     TEST_ASSERT_FALSE(recalls(700, knee / COMPENSATION_KNEE_RANGE - 1, 1));
-    TEST_ASSERT_TRUE(recalls(1567, knee + 1, 0)); /* not measured: the motor data remain */
+    TEST_ASSERT_TRUE(recalls(984, knee + 1, 0)); /* not measured: the motor data remain */
     TEST_ASSERT_EQUAL_INT(dead_time(&motor.parameters), dead_time(&drive.parameters));
 }
 
