@@ -26,6 +26,7 @@ static q15_t measured_speed(void)
 
 static q15_t measured_v_dc(void)
 {
+    sampling_first_end();
     const float share = (float)sampling_first_v_dc() / (float)(1U << motor.adc_bits);
     return q15_from_si(share * motor.v_dc_full_scale_V, motor.bases.voltage_V);
 }
@@ -45,6 +46,7 @@ bool after_reset_begin(const pwm_config_t *pwm)
     clock_first();
     pins_init();
     pwm_init(pwm);
+    sampling_first_begin();
     speed = measured_speed();
     const q15_t v_dc = measured_v_dc();
     if (!after_reset_needs_short_circuit(&motor, &retained.drive, speed, v_dc) || !is_link_charged(v_dc)) {

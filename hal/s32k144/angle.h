@@ -14,8 +14,8 @@
 
 void angle_init(uint32_t period_ticks);
 /** Magnitude of the mechanical speed in turns per second, on the clock of clock_first(); negative: the sensor reports a
- * fault. Start-up, after pwm_init() and before angle_init(); takes up to 0.1 ms, with a resolver at the converters 11
- * periods of its excitation. */
+ * fault. Start-up, after pwm_init() and sampling_first_begin(), before angle_init(); takes up to 0.1 ms, a sensor at
+ * the converters 0.1 ms after their calibration, and a resolver there 11 periods of its excitation or more. */
 float angle_first_speed(void);
 bool angle_fault(void);
 /** While hal_angle_is_absolute() is false. Once the encoder's index has passed, the next angle is absolute; the result

@@ -32,8 +32,8 @@ void angle_init(uint32_t period_ticks)
 /* Speed from two angles. An offset or amplitude error of x % of the amplitude falsifies the speed by x %. */
 float angle_first_speed(void)
 {
-    sampling_first_calibrate();
     excitation_first();
+    sampling_first_end();
     const angle_counts_t from = sampling_first_angle();
     const float per_s = excitation_pass();
     const angle_counts_t to = sampling_first_angle();

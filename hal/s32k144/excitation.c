@@ -32,9 +32,11 @@ static uint32_t first_period(void)
     return (FTM0->MOD + 1U) * (CLOCK_FIRST_HZ / 1000000U) / (CLOCK_CORE_HZ / 1000000U);
 }
 
+/* Not shorter than the calibration: waiting for its end without pulses would lose amplitude and phase. If it does not
+ * end, the watchdog resets. */
 void excitation_first(void)
 {
-    for (uint32_t k = 0; k < SETTLING_PERIODS; k++) {
+    for (uint32_t k = 0; k < SETTLING_PERIODS || sampling_first_calibrates(); k++) {
         (void)excitation_pass();
     }
 }

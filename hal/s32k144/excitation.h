@@ -19,7 +19,7 @@
 #if ANGLE_EXCITED
 /** The output is switched by software until the windings have settled; from the counter's start on by the timer. */
 void excitation_start(uint32_t period_ticks);
-/** The same; then sine and cosine may be sampled. */
+/** The same, and until the converters have been calibrated; then sine and cosine may be sampled. */
 void excitation_first(void);
 /** Until they may be sampled again; how often that is possible per second. */
 float excitation_pass(void);

@@ -11,6 +11,7 @@
 #define BITS_12 1U
 #define SAMPLE_CLOCKS 7U /* 8 ADC clocks, 286 ns: the data sheet requires 275 */
 #define AVERAGE_32 3U
+#define FULL_CLOCK 0U
 #define HALF_CLOCK 1U
 #define DIE_SENSOR 26U
 #define BANDGAP 27U
@@ -54,17 +55,28 @@ static void clear_calibration(adc_t *adc)
     adc->CLP9 = 0;
 }
 
-static void calibrate(adc_t *adc)
+static FX_NOT_INLINED FX_COLD void begin_calibration(adc_t *adc, uint32_t divider)
 {
     adc->SC2 = 0;
     clear_calibration(adc);
-    adc->CFG1 = ADC_CFG1_MODE(BITS_12) | ADC_CFG1_ADIV(HALF_CLOCK);
+    adc->CFG1 = ADC_CFG1_MODE(BITS_12) | ADC_CFG1_ADIV(divider);
     adc->SC3 = ADC_SC3_CAL | ADC_SC3_AVGE | ADC_SC3_AVGS(AVERAGE_32);
+}
+
+static FX_NOT_INLINED FX_COLD void end_calibration(adc_t *adc)
+{
     await(&adc->SC3, ADC_SC3_CAL, 0);
     adc->SC3 = 0;
     adc->CFG1 = ADC_CFG1_MODE(BITS_12);
     adc->CFG2 = ADC_CFG2_SMPLTS(SAMPLE_CLOCKS);
     adc->SC2 = ADC_SC2_ADTRG;
+}
+
+/* Both at the same time: each converter calibrates itself, and nothing is converted meanwhile. */
+static void begin_calibrations(uint32_t divider)
+{
+    begin_calibration(ADC0, divider);
+    begin_calibration(ADC1, divider);
 }
 
 /* The values of the delays act from now on. */
@@ -109,8 +121,8 @@ static void choose_inputs(void)
 
 void sampling_init(uint32_t period_ticks)
 {
-    calibrate(ADC0);
-    calibrate(ADC1);
+    begin_calibrations(HALF_CLOCK);
+    sampling_first_end();
     choose_inputs();
     TRGMUX->TRGMUX_PDB0 = TRGMUX_PDB0_SEL0(FTM0_INIT_TRIGGER);
     TRGMUX->TRGMUX_PDB1 = TRGMUX_PDB1_SEL0(FTM0_INIT_TRIGGER);
@@ -138,17 +150,27 @@ static uint16_t converted(const adc_t *adc)
     return (uint16_t)adc->R[0];
 }
 
-uint16_t sampling_first_v_dc(void)
+/* 24 MHz: at most half of the fastest clock, 25 MHz. */
+void sampling_first_begin(void)
 {
-    calibrate(ADC1);
-    start_at_once(ADC1, V_DC);
-    return converted(ADC1);
+    begin_calibrations(FULL_CLOCK);
 }
 
-void sampling_first_calibrate(void)
+bool sampling_first_calibrates(void)
 {
-    calibrate(ADC0);
-    calibrate(ADC1);
+    return ((ADC0->SC3 | ADC1->SC3) & ADC_SC3_CAL) != 0U;
+}
+
+void sampling_first_end(void)
+{
+    end_calibration(ADC0);
+    end_calibration(ADC1);
+}
+
+uint16_t sampling_first_v_dc(void)
+{
+    start_at_once(ADC1, V_DC);
+    return converted(ADC1);
 }
 
 angle_counts_t sampling_first_angle(void)

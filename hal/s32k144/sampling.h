@@ -12,7 +12,7 @@
  * Context  sampling_init(), sampling_pulse(): start-up, before the PWM starts; sampling_error_isr(): both delay blocks'
  *          interrupts, at the fast ISR's priority; sampling_tick() and the slow channels, as converted last: 1 kHz
  *          task; sampling_angle(): fast ISR, in every period, or its pre-triggers stay locked;
- *          sampling_first_calibrate(), sampling_first_angle(): start-up, before sampling_init() */
+ *          sampling_first_*(): start-up, before sampling_init(), on the clock of clock_first() */
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -28,10 +28,12 @@ enum { SAMPLING_ANGLE = 2 }; /* conversion of sine and cosine in the sequence of
 #define SAMPLING_ANGLE_TICKS (3U * 3U + 2U * 38U * 4U + 8U * 4U)
 
 void sampling_init(uint32_t period_ticks);
-/** The dc voltage, converted at once; start-up, before sampling_init(). */
+/** Both converters begin their calibration, and have ended it after sampling_first_end(), which may be called again. */
+void sampling_first_begin(void);
+bool sampling_first_calibrates(void);
+void sampling_first_end(void);
+/** After the calibration: the dc voltage; sine and cosine together; each converted at once, any number of times. */
 uint16_t sampling_first_v_dc(void);
-/** Sine and cosine, converted at once and together, any number of times after the calibration. */
-void sampling_first_calibrate(void);
 angle_counts_t sampling_first_angle(void);
 /** Those of this period. */
 static inline angle_counts_t sampling_angle(void)

@@ -5,7 +5,7 @@
  *
  * How long a calibration takes is not known. The manuals of the sister family Kinetis say, from memory, as many as
  * 14,000 converter clocks (and 100 of the bus, which are left out). Seven values with an average of 32 conversions
- * each would be 9,632. The longer one is used.
+ * each would be 9,632. The longer one is used, and emu_adc_calibration() sets another.
  *
  * documented behaviour                               | modelled | test
  * -------------------------------------------------- | -------- | --------------------------------------------
@@ -18,6 +18,7 @@
  * a trigger during a conversion is ignored           | yes      | test_a_trigger_during_a_conversion_is_ignored
  * calibration before use, and its conditions         | refused  | test_what_is_not_modelled_is_an_error
  * CAL is set for as long as a calibration takes      | yes      | test_a_calibration_takes_its_time
+ * each converter calibrates by itself               | yes      | test_both_converters_calibrate_at_the_same_time
  * a register written during a calibration            | refused  | test_a_write_during_a_calibration_is_refused
  * shortest sample time, fastest clock                | refused  | test_what_is_not_modelled_is_an_error
  * 8 and 10 bits                                      | refused  | test_other_resolutions_are_refused
@@ -43,7 +44,6 @@ enum {
     AIEN = 0x40,
     OFF = 31,
     CONVERSION = 30,
-    CALIBRATION = 14000,
     CALIBRATING = 100, /* in place of a conversion's number */
     CAL = 0x80,
     ADC0_IRQ = 39,
@@ -137,8 +137,13 @@ static void calibrate(emu_t *emu, const peripheral_t *self)
     }
     adc_t *a = &emu->s.adc[self->instance];
     a->current = CALIBRATING;
-    a->done = emu_instant(emu) + (uint64_t)CALIBRATION * clock;
+    a->done = emu_instant(emu) + (uint64_t)emu->calibration * clock;
     emu_timer(emu, self->instance == 0 ? TIMER_ADC0 : TIMER_ADC1, a->done);
+}
+
+void emu_adc_calibration(emu_t *emu, uint32_t clocks)
+{
+    emu->calibration = clocks;
 }
 
 static void calibration_end(emu_t *emu, const peripheral_t *self)

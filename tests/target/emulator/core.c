@@ -564,6 +564,7 @@ emu_t *emu_create(const char *elf, int mode, char *error, size_t size)
     emu->as5047 = emu_symbol(emu, "angle_sensor_as5047") != 0U;
     emu->analogue = emu_symbol(emu, "angle_sensor_analogue") != 0U;
     emu->excited = emu_symbol(emu, "angle_sensor_analogue") == 2U;
+    emu_adc_calibration(emu, ADC_CALIBRATION);
     analogue_power_on(emu);
     data_flash_create(emu);
     emu_reset(emu, 0);

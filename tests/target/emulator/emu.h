@@ -80,6 +80,9 @@ EMU_API void emu_core_state(emu_t *emu, emu_core_state_t state);
 /** Whether a fault of the core is an exception, as on the chip; from creation on it ends the emulation. Outlasts a
  * reset. */
 EMU_API void emu_core_faults(emu_t *emu, bool taken);
+/** How long the calibration of a converter takes, in its clocks; from creation on 14,000, which is assumed. Outlasts a
+ * reset. */
+EMU_API void emu_adc_calibration(emu_t *emu, uint32_t clocks);
 /** State of a line of port C to the board: driven high or low; released while it is no output, as after a reset. */
 typedef enum { EMU_LINE_RELEASED = 0, EMU_LINE_LOW = 1, EMU_LINE_HIGH = 2 } emu_line_t;
 EMU_API emu_line_t emu_line(const emu_t *emu, unsigned line);

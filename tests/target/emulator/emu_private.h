@@ -245,9 +245,10 @@ struct emu {
     uc_engine *uc;
     elf_t elf;
     emu_mode_t mode;
-    bool as5047;   /* the image was built for this encoder at LPSPI0 */
-    bool analogue; /* for a sine and a cosine at the converters, */
-    bool excited;  /* of a resolver */
+    bool as5047;          /* the image was built for this encoder at LPSPI0 */
+    bool analogue;        /* for a sine and a cosine at the converters, */
+    bool excited;         /* of a resolver */
+    uint32_t calibration; /* of a converter, in its clocks */
     const facts_t *facts_of[PERIPHERALS_MAX];
     int16_t *index_of[PERIPHERALS_MAX]; /* by offset: register of facts_of, -1 none */
     int16_t page[256];
@@ -391,6 +392,7 @@ void pdb_trigger(emu_t *emu, int instance);
 void pdb_fire(emu_t *emu, int instance);
 /** False: no conversion was started. */
 bool adc_pretrigger(emu_t *emu, int instance, int channel);
+enum { ADC_CALIBRATION = 14000 }; /* clocks of a calibration, assumed */
 void adc_fire(emu_t *emu, int instance);
 void pdb_acknowledge(emu_t *emu, int instance, int channel);
 void pdb_reset(emu_t *emu);

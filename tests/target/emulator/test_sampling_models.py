@@ -40,11 +40,11 @@ def core(library: ctypes.CDLL, program: Program) -> Iterator[Core]:
         yield core
 
 
-def calibrate_again(core: Core) -> None:
-    core.store("ADC0.SC2", 0)
+def calibrate_again(core: Core, converter: str = "ADC0") -> None:
+    core.store(f"{converter}.SC2", 0)
     for name in ("CLPS", "CLP3", "CLP2", "CLP1", "CLP0", "CLPX", "CLP9"):
-        core.store(f"ADC0.{name}", 0)
-    core.store("ADC0.SC3", 0x87)
+        core.store(f"{converter}.{name}", 0)
+    core.store(f"{converter}.SC3", 0x87)
 
 
 def test_a_calibration_takes_its_time(core: Core) -> None:
@@ -54,6 +54,34 @@ def test_a_calibration_takes_its_time(core: Core) -> None:
     core.run(0.002 * CALIBRATION_S)
     assert core.load("ADC0.SC3") & CAL == 0
     assert core.load("ADC0.SC10") & COCO
+
+
+def test_both_converters_calibrate_at_the_same_time(core: Core) -> None:
+    """Each one's CAL falls when its own time has passed, and with its own clock."""
+    core.store("PCC.PCC_ADC1", 3 << 24)
+    core.store("PCC.PCC_ADC1", 3 << 24 | 1 << 30)
+    core.store("ADC1.CFG1", 4 | 1 << 5)  # 6 MHz
+    calibrate_again(core)
+    core.run(0.25 * CALIBRATION_S)
+    calibrate_again(core, "ADC1")
+    core.run(0.74 * CALIBRATION_S)
+    assert [core.load(f"ADC{k}.SC3") & CAL for k in range(2)] == [CAL, CAL]
+    core.run(0.02 * CALIBRATION_S)
+    assert [core.load(f"ADC{k}.SC3") & CAL for k in range(2)] == [0, CAL]
+    core.store("ADC0.SC3", 0)  # no write during a calibration
+    core.run(1.23 * CALIBRATION_S)
+    assert core.load("ADC1.SC3") & CAL
+    core.run(0.02 * CALIBRATION_S)
+    assert core.load("ADC1.SC3") & CAL == 0
+
+
+def test_a_longer_calibration_can_be_set(core: Core) -> None:
+    core.adc_calibration(28_000)
+    calibrate_again(core)
+    core.run(1.999 * CALIBRATION_S)
+    assert core.load("ADC0.SC3") & CAL
+    core.run(0.002 * CALIBRATION_S)
+    assert core.load("ADC0.SC3") & CAL == 0
 
 
 @pytest.mark.parametrize("name", ["SC10", "SC2", "SC3", "CFG2"])

@@ -16,11 +16,16 @@
 ftm_t fake_FTM0;
 adc_t fake_ADC0, fake_ADC1;
 static bool high;
-static uint32_t now, rises, last_rise, longest, pulse_from, pulse_until, by_timer;
+static uint32_t now, rises, last_rise, longest, pulse_from, pulse_until, by_timer, calibrated;
 
 void core_pass(uint32_t clocks)
 {
     now += clocks;
+}
+
+bool sampling_first_calibrates(void)
+{
+    return now < calibrated;
 }
 
 void pwm_hold_pulse(bool level)
@@ -43,7 +48,7 @@ void pwm_pulse(uint32_t from, uint32_t until)
 void setUp(void)
 {
     high = false;
-    now = rises = last_rise = longest = by_timer = 0;
+    now = rises = last_rise = longest = by_timer = calibrated = 0;
     fake_FTM0.MOD = PERIOD - 1U;
 }
 
@@ -74,6 +79,16 @@ void test_before_the_clocks_are_set_up_the_period_is_the_same(void)
     TEST_ASSERT_FLOAT_WITHIN(0.1F, 10000.0F, excitation_pass());
     TEST_ASSERT_EQUAL_UINT32(4800, now - last_rise);
     TEST_ASSERT_EQUAL_UINT32(0, by_timer);
+}
+
+/* The converters need a little more than 12 periods: the pulses continue, and the last one is complete. */
+void test_the_output_is_switched_until_the_converters_have_been_calibrated(void)
+{
+    calibrated = 12 * 4800 + 100;
+    excitation_first();
+    TEST_ASSERT_EQUAL_UINT32(13, rises);
+    TEST_ASSERT_EQUAL_UINT32(4800, longest);
+    TEST_ASSERT_EQUAL_UINT32(4800, now - last_rise);
 }
 
 /* At the negative peak both tracks have the other sign. */

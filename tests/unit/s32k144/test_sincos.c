@@ -22,16 +22,16 @@
 adc_t fake_ADC0, fake_ADC1;
 static angle_counts_t first[2];
 static uint32_t passed;
-static int calibrated, converted;
+static int awaited, converted;
 
 void core_pass(uint32_t clocks)
 {
     passed += clocks;
 }
 
-void sampling_first_calibrate(void)
+void sampling_first_end(void)
 {
-    calibrated++;
+    awaited++;
 }
 
 angle_counts_t sampling_first_angle(void)
@@ -68,7 +68,7 @@ static double error_rad(uint32_t angle, double expected_rad)
 
 void setUp(void)
 {
-    calibrated = converted = 0;
+    awaited = converted = 0;
     passed = 0;
     angle_init(PERIOD);
 }
@@ -346,7 +346,7 @@ void test_the_first_speed_is_that_of_two_angles(void)
         first[1] = (angle_counts_t){count(sin(1.0 + sign * 0.012)), count(cos(1.0 + sign * 0.012))};
         TEST_ASSERT_FLOAT_WITHIN(3.0F, 19.1F, angle_first_speed());
     }
-    TEST_ASSERT_EQUAL(2, calibrated);
+    TEST_ASSERT_EQUAL(2, awaited);
     TEST_ASSERT_EQUAL_UINT32(9600, passed); /* 2 x 0.1 ms of 48 MHz */
     first[1] = (angle_counts_t){0, 2048};
     TEST_ASSERT_TRUE(angle_first_speed() < 0.0F);

@@ -79,6 +79,7 @@ _SIGNATURES = {
     "emu_outputs": (_U32, [_HERE]),
     "emu_core_state": (None, [_HERE, _INT]),
     "emu_core_faults": (None, [_HERE, _BOOL]),
+    "emu_adc_calibration": (None, [_HERE, _U32]),
     "emu_power_cycle": (None, [_HERE]),
     "emu_reset_now": (None, [_HERE, _U32]),
     "emu_flash_slow": (None, [_HERE, _BOOL]),
@@ -247,6 +248,10 @@ class Core:
     def take_faults(self, taken: bool = True) -> None:
         """Let a fault of the core be an exception, as on the chip, instead of the end of the emulation."""
         self._library.emu_core_faults(self._handle, taken)
+
+    def adc_calibration(self, clocks: int) -> None:
+        """Let the calibration of a converter take so many of its clocks."""
+        self._library.emu_adc_calibration(self._handle, clocks)
 
     def reset(self, cause: int) -> None:
         """Reset the processor now; the bits of RCM_SRS say why. With POR (0x80) the supply has failed."""
