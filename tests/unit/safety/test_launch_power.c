@@ -498,7 +498,7 @@ static void compare(const twin_t *twin, double beyond, int compared[2])
     TEST_ASSERT_EQUAL_INT(twin->steady, state.steady);
     if (twin->steady > 1) { /* the step that begins anew leaves the means to the next one */
         TEST_ASSERT_DOUBLE_WITHIN(3.0, twin->p, state.power_q8 / 256.0);
-        TEST_ASSERT_DOUBLE_WITHIN(3.0 + 2e-4 * fabs(twin->p_0), twin->p_0, state.first_power_q8 / 256.0);
+        TEST_ASSERT_DOUBLE_WITHIN(3.0 + 5e-5 * fabs(twin->p_0), twin->p_0, state.first_power_q8 / 256.0);
         TEST_ASSERT_DOUBLE_WITHIN(1.5, twin->w, state.omega_q8 / 256.0);
         TEST_ASSERT_DOUBLE_WITHIN(1.5, twin->w_0, state.first_omega_q8 / 256.0);
     }
