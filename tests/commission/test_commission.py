@@ -68,8 +68,10 @@ def test_map_and_resistance_of_a_hidden_machine(name: str, seed: int, unknown: M
 
 def test_a_rotor_that_moves_at_a_level_is_measured_until_it_does(unknown: Motor, known: Nameplate) -> None:
     """Where the shaft rests the harmonics of the angle sensor give the direct current a part along q: all tries at a
-    level end before their time. Without (CM-42) the resistance is wrong by 5 %."""
+    level end before their time. Without (CM-42) the resistance is wrong by 5 %. The rotor is braked as over CAN, where
+    it does not stand as well before a current."""
     drive, truth = hidden.make("hsm1", 115, unknown, known.i_max_A, connected=False, other_errors=True)
+    drive.strikes = False
     found = run(drive, chosen(("phases", "resistance")), known, lambda _: None)
     assert found.resistance is not None and any(raw.failure == MOVED for raw in found.levels)
     error, _ = resistance_error(found.resistance.r_ohm, truth)
@@ -120,21 +122,6 @@ def test_the_rotor_swings_little(name: str, seed: int, most_deg: float, unknown:
     swings_deg = np.degrees(known.pole_pairs * np.array(drive.swings_rad[-len(found.bursts) :]))
     print(name, seed, np.round(swings_deg, 1))
     assert 0.0 < swings_deg.max() <= most_deg
-
-
-def test_the_swing_grows_with_the_square_of_the_pole_pairs(unknown: Motor, known: Nameplate) -> None:
-    """(CM-28): hsm1 100 and 105 have six and seven pole pairs when their connection is unknown, and four when it is
-    not."""
-    rms_deg = {}
-    for pole_pairs in (4, 8):
-        _, flux_map, plant = hidden.draw("hsm1", 105, unknown, known.i_max_A, connected=False, other_errors=True)
-        drive = Watched(Loop(unknown.library, plant | {"pole_pairs": float(pole_pairs)}, flux_map))
-        found = run(drive, chosen(("all",)), known, lambda _: None)
-        assert found.spun is not None and found.spun.connection.pole_pairs == pole_pairs
-        swings_deg = np.degrees(pole_pairs * np.array(drive.swings_rad[-len(found.bursts) :]))
-        rms_deg[pole_pairs] = float(np.sqrt(np.mean(swings_deg**2)))
-        print(pole_pairs, f"{rms_deg[pole_pairs]:.2f} rms, largest {swings_deg.max():.2f} degrees")
-    assert rms_deg[8] / rms_deg[4] == pytest.approx(4.0, rel=0.2)
 
 
 def test_the_truth_cannot_be_read(unknown: Motor, known: Nameplate) -> None:

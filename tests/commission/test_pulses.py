@@ -112,6 +112,7 @@ def test_a_current_beyond_the_largest_ends_it(unknown: Motor, known: Nameplate) 
 class Hesitant(SoftwareInTheLoop):
     """Refuses so many starts, as for a speed that seems not to be zero."""
 
+    strikes = False  # the half waves that brake a rotor are starts, too
     refusals = 0
     starts = 0
     allowed_rad = 0.0

@@ -11,7 +11,8 @@ from fluxtrue_tools.sim.library import Loop
 
 
 class Watched(SoftwareInTheLoop):
-    """With the plant's true angle beside what is recorded; one value for each burst, of the shaft."""
+    """With the plant's true angle beside what is recorded; one value for each burst, of the shaft. The half waves that
+    brake the rotor before a burst are none."""
 
     def __init__(self, loop: Loop) -> None:
         super().__init__(loop)
@@ -27,6 +28,8 @@ class Watched(SoftwareInTheLoop):
         return np.asarray(rows[:, :-1])
 
     def pulse(self, values: Mapping[str, float]) -> Array:
+        if values["pulses_reversals"] == 1.0:
+            return super().pulse(values)
         self.angles = []
         self.starts_rad_s.append(self._loop.get("truth.speed_rad_s"))
         rows = super().pulse(values)

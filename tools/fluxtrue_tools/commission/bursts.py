@@ -18,6 +18,9 @@ REFUSED, MOVED = FAILURES[1], FAILURES[3]
 STARTS = 6  # of one burst
 PUSHES = 20  # short currents against a light rotor, at most
 FOLLOW_S, FOLLOWED = 0.02, 14  # a heavy rotor: time between two changes of the current, and their number at most
+STRIKE, STRIKE_FIRST, STRIKE_VOLTAGE = (0.01, 0.3), 0.06, 0.15  # bounds of i_max, the first of them; of the voltage
+STRIKES, STRUCK = 10, 3.0  # at most; by how much one may change what is known of their effect
+STRIKE_PAIRS = 4  # from so many pole pairs on a rotor stands at the same electrical speed
 CERTAIN_RPM = 2.0  # change of the speed that is expected: from it on other torques hardly count
 LIGHT, HEAVY = (0.1, 100.0), 0.5  # range of the lightness; up to HEAVY a rotor counts as heavy
 ADAPTED, ADAPTED_LITTLE = 16.0, 2.0  # times at most that a current may show; the lightness changes by the root of it
@@ -159,19 +162,58 @@ def _follow(drive: Capture, known: Nameplate, speed_rpm: float) -> None:
     drive.rest(FOLLOW_S)
 
 
+def _bound_A(drive: Capture, known: Nameplate, speed_rpm: float) -> float:
+    """Of a half wave that takes the speed away: its impulse grows with the square of its bound."""
+    least, most = (share * known.i_max_A for share in STRIKE)
+    if drive.struck <= 0.0:
+        return STRIKE_FIRST * known.i_max_A
+    return min(max(math.sqrt(abs(speed_rpm) / drive.struck), least), most)
+
+
+def _strike_once(drive: Capture, known: Nameplate, speed_rpm: float) -> float:
+    """One half wave of pulses along q against the speed, and the speed after it, which says for the next one by how
+    much a bound changes it: (CM-44)."""
+    top_A = _bound_A(drive, known, speed_rpm)
+    q = (0.0, top_A) if speed_rpm < 0.0 else (-top_A, 0.0)
+    burst = Burst(0.0, STRIKE_VOLTAGE, (-top_A, top_A), q, reversals=1, first=1.0, angle_deg=known.swing_deg)
+    drive.pulse(burst.shifted(_shift(drive, known)).values())
+    drive.hold(known.offset_A)
+    after = drive.speed_rpm(FOLLOW_S)
+    changed = (speed_rpm - after) * math.copysign(1.0, speed_rpm)
+    if _phase_word(drive) != REFUSED and (drive.struck <= 0.0 or abs(changed) > 2.0 * STANDING_RPM):
+        shown = max(changed, STANDING_RPM / 10.0) / top_A**2
+        low, high = (drive.struck / STRUCK, drive.struck * STRUCK) if drive.struck > 0.0 else (0.0, math.inf)
+        drive.struck = min(max(shown, low), high)
+    return after
+
+
+def _strike(drive: Capture, known: Nameplate, speed_rpm: float) -> None:
+    """Half waves against the speed of a heavy rotor, one after the other: unlike a small reference of the current
+    control their current does not depend on what the legs lose. The firmware refuses them while the rotor turns fast:
+    then a current follows the speed first. With many pole pairs the same electrical angle is a slower shaft."""
+    standing_rpm = STANDING_RPM * min(STRIKE_PAIRS / known.pole_pairs, 1.0)
+    for _ in range(STRIKES):
+        if abs(speed_rpm) < standing_rpm:
+            break
+        speed_rpm = _strike_once(drive, known, speed_rpm)
+        if _phase_word(drive) == REFUSED:
+            _follow(drive, known, speed_rpm)
+            speed_rpm = drive.speed_rpm(FOLLOW_S)
+
+
 def _brake(drive: Capture, known: Nameplate) -> None:
     """The alternating torque leaves some speed, which small currents along q take away.
 
     With a light rotor only a speed without current counts: the current of a rotor that has just stopped would turn it
-    back while it falls to zero. A heavy one is braked by its speed during the current. Without current is without the
-    offsets of the sensors, whose torque turns a light rotor."""
+    back while it falls to zero. A heavy one is braked by half waves, over CAN by a current that follows its speed.
+    Without current is without the offsets of the sensors, whose torque turns a light rotor."""
     drive.hold(known.offset_A)
     speed = drive.speed_rpm(SEEN_S)
     for _ in range(PUSHES):
         if abs(speed) < STANDING_RPM:
             break
         if drive.lightness <= HEAVY:
-            _follow(drive, known, speed)
+            (_strike if drive.strikes else _follow)(drive, known, speed)
             break
         speed = _push_once(drive, known, speed)
     drive.rest(REST_S)

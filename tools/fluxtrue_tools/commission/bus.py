@@ -112,7 +112,7 @@ class OverTheBus:
         self._is_moving = self._is_imposed = False
         self._connection = Movement()
         self._failure = 0.0
-        self.lightness = LIGHTNESS
+        self.lightness, self.strikes, self.struck = LIGHTNESS, False, 0.0
         self._prepared: dict[str, float] = {}
         line.pass_time(LISTEN_S)
         self._master = XcpMaster(line)

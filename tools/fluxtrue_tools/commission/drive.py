@@ -21,7 +21,7 @@ HIDDEN = ("plant.", "truth.")  # what belongs to the simulated machine, not to t
 MEASURED = ("id_A", "iq_A", "ud_V", "uq_V", "theta_e_rad", "i_zero_A")
 SIGNALS = (*MEASURED, "pulses")
 PULSE, DONE, FAILED = 1.0, 3.0, 4.0  # of the name pulses
-CHUNK = 200  # periods recorded at once
+CHUNK, SHORT_CHUNK = 200, 20  # periods recorded at once; of a half wave that brakes, which hold() follows at once
 PERIODS_MAX = 4000
 SEEN_S, FALLS = 0.01, 6  # a speed is measured in this time, at most so many times until a current has fallen
 STANDING_RPM = 0.5
@@ -42,6 +42,8 @@ class Capture(Protocol):
     slower: float  # how many times longer it runs than software in the loop
     brake_s: float  # of a current that brakes the rotor
     lightness: float  # of the rotor, as a multiple of the guess: what the braking currents have shown
+    strikes: bool  # a heavy rotor is braked by pulses
+    struck: float  # change of the speed by a half wave of pulses over the square of its bound, rpm/A^2; 0: not known
 
     @property
     def period_s(self) -> float:
@@ -91,12 +93,14 @@ class SoftwareInTheLoop:
     settings: tuple[str, ...] = switched_off + CONNECTION
     slower: float = 1.0
     brake_s: float = 0.005
+    strikes = True
 
     def __init__(self, loop: Loop) -> None:
         self._loop = loop
         self.period_s = loop.period_s
         self.passed: Callable[[float], None] = nothing
         self.lightness = LIGHTNESS
+        self.struck = 0.0
 
     @staticmethod
     def _allowed(name: str) -> str:
@@ -172,9 +176,10 @@ class SoftwareInTheLoop:
             self.set(name, value)
         self.let_go()
         self.set("pulses", PULSE)
-        parts = [self.capture(SIGNALS, CHUNK)]
+        chunk = SHORT_CHUNK if values["pulses_reversals"] == 1.0 else CHUNK
+        parts = [self.capture(SIGNALS, chunk)]
         while parts[-1][-1, -1] not in (DONE, FAILED):
-            parts.append(self.capture(SIGNALS, CHUNK))
-            if len(parts) * CHUNK > 2 * PERIODS_MAX:
+            parts.append(self.capture(SIGNALS, chunk))
+            if len(parts) * chunk > 2 * PERIODS_MAX:
                 raise FluxtrueError("commission: the voltage pulses do not end")
         return np.vstack(parts)

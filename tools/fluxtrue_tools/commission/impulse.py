@@ -54,9 +54,11 @@ def _rise(i_q: Array) -> slice:
 
 
 def balanced(
-    raw: Raw, losses: Losses, psi_f_Vs: float, top_A: float, more_A: float = 0.0, more_Vs: float = 0.0
-) -> float:
-    """The share of its bound at which the first half wave along q ends with half of the impulse of the others: (CM-27).
+    raw: Raw, losses: Losses, psi_f_Vs: float, top_A: float, more_A: float = 0.0, more_Vs: float = 0.0,
+    part: float = 0.5,
+) -> float:  # fmt: skip
+    """The share of its bound at which the first half wave along q ends with a part of the impulse of the others: with
+    half of it the rotor swings to one side, (CM-27).
 
     top_A             bound of the next burst
     more_A, more_Vs   current and flux linkage along d that the next burst has more than this one
@@ -67,5 +69,5 @@ def balanced(
     i_q = raw.i.imag[rise]
     impulse = np.maximum.accumulate(np.cumsum(torque * np.sign(i_q[-1])))
     reached = np.maximum.accumulate(np.abs(i_q))
-    half = 0.5 * float(np.interp(top_A, reached, impulse))
-    return float(np.clip(np.interp(half, impulse, reached) / min(top_A, float(reached[-1])), *FIRST))
+    wanted = part * float(np.interp(top_A, reached, impulse))
+    return float(np.clip(np.interp(wanted, impulse, reached) / min(top_A, float(reached[-1])), *FIRST))

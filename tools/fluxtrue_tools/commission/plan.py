@@ -38,6 +38,11 @@ BURSTS = 2  # at each of them: a short one moves the rotor less than a long one 
 LOST_MAX = 2  # bursts of all that may fail
 TRAVEL = 1.5  # of the time to the bias without saturation
 REVERSALS_D = 4
+FAR_RAD = 0.0087  # electrical, half a degree: what is expected to move the rotor further is planned for less movement:
+FAR_PART = 0.47  # the impulse of the first half wave, of the next one's: the rotor swings to both sides, (CM-43)
+FAR_STEP = 0.18  # of i_max: change of a current that rises
+FAR_VOLTAGE = 0.68  # at most
+FAR_NEXT = 1.25  # of the last bound along q: a larger one has a level between them
 MOVED_RAD = 0.004  # electrical: by which a burst at a bias may move the rotor without a higher voltage for the next
 SMALLER = 0.9  # at least, of its bound, for a burst after one that has moved the rotor far
 LONG_LESS = 2.0  # times less than three half waves move five of them the rotor, (CM-41)
@@ -123,11 +128,14 @@ def _steepest(raw: Raw, share: float, of_q: bool) -> float:
     return float(np.abs(np.diff(i)).max()) / share
 
 
-def _steepest_within(raw: Raw, share: float, top_A: float) -> float:
-    """The largest change of the current along q in a period that begins or ends within a bound, for a share of 1."""
+def _steepest_within(raw: Raw, share: float, top_A: float, is_rising: bool = False) -> float:
+    """The largest change of the current along q in a period that begins or ends within a bound, for a share of 1;
+    is_rising: only of those away from zero."""
     i = raw.i.imag
     changes = np.abs(np.diff(i))
     inside = np.minimum(np.abs(i[1:]), np.abs(i[:-1])) < top_A
+    if is_rising:
+        inside &= np.abs(i[1:]) > np.abs(i[:-1])
     return float(changes[inside].max()) / share
 
 
@@ -140,12 +148,27 @@ class Taken:
     waves: Waves
     along_d_A: float = 0.0
 
-    def quiet_A(self, top_A: float, share: float) -> float:
-        """The bound of a burst of three half waves: smaller if the movement of this one says that it would be too
-        large, (CM-28)."""
+    def expected_rad(self, top_A: float, share: float) -> float:
+        """The movement by three half waves, (CM-28)."""
         as_short = LONG_LESS if self.waves.reversals == LONG else 1.0
-        moved_rad = as_short * self.raw.moved_rad * (top_A / self.waves.high_A) ** 3 * (self.share / share) ** 2
+        return as_short * self.raw.moved_rad * (top_A / self.waves.high_A) ** 3 * (self.share / share) ** 2
+
+    def quiet_A(self, top_A: float, share: float) -> float:
+        """The bound of a burst of three half waves: smaller if it would move the rotor too far."""
+        moved_rad = self.expected_rad(top_A, share)
         return top_A * min(max((SWING_RAD / max(moved_rad, SWING_RAD)) ** (1.0 / 3.0), SMALLER), 1.0)
+
+    def far_share(self, top_A: float, i_max_A: float) -> float:
+        """The voltage at which the current rises by FAR_STEP in a period. It falls faster, because winding and legs
+        help, but then its bound cannot be missed. Beyond what this burst has reached saturation goes on."""
+        growth = max(top_A / float(np.abs(self.raw.i.imag).max()), 1.0)
+        steepest_A = growth * _steepest_within(self.raw, self.share, top_A, is_rising=True)
+        return min(_voltage(steepest_A, i_max_A, FAR_STEP), FAR_VOLTAGE)
+
+
+def _expected_rad(taken: Sequence[Taken], top_A: float, share: float) -> float:
+    """By the one of the last bursts that moved the rotor most: that another one was balanced better was chance."""
+    return max(each.expected_rad(top_A, share) for each in taken)
 
 
 def _waves(taken: Sequence[Taken], share: float, volts: float, top_A: float, losses: Losses, guess_Vs: float,
@@ -160,9 +183,10 @@ def _waves(taken: Sequence[Taken], share: float, volts: float, top_A: float, los
     last = taken[-1]
     if share >= VOLTAGES[1]:
         return quietest(response(last.raw), share * volts, top_A)
+    part = FAR_PART if _expected_rad(taken[-2:], top_A, share) > FAR_RAD else 0.5
     top_A = last.quiet_A(top_A, share)
     psi_f_Vs = magnet_Vs([each.raw for each in taken], losses, guess_Vs)
-    return Waves(-top_A, top_A, balanced(last.raw, losses, psi_f_Vs, top_A, more_A, more_Vs), SHORT)
+    return Waves(-top_A, top_A, balanced(last.raw, losses, psi_f_Vs, top_A, more_A, more_Vs, part), SHORT)
 
 
 def _along_q(v_d: float, share: float, d: tuple[float, float], waves: Waves, delay: int = 0) -> Burst:
@@ -184,6 +208,8 @@ def at_bias(seen: Sequence[Taken], off_A: float, i_max_A: float) -> tuple[float,
     wanted = last.share * math.sqrt(last.raw.moved_rad / MOVED_RAD)
     highest = _highest(_steepest(last.raw, last.share, of_q=True), i_max_A)
     following = min(max(wanted, low), high, FASTER * last.share, highest)
+    if _expected_rad(seen, top_A, following) > FAR_RAD:
+        following = max(following, min(last.far_share(top_A, i_max_A), FASTER * last.share))
     reach_A -= MISSED * max(following * steepest_A - BIAS_STEPS[0] * i_max_A, 0.0)
     return following, math.sqrt(reach_A**2 - off_A**2)
 
@@ -205,30 +231,47 @@ def _of_level(top_A: float, steepest_A: float, step: float, known: Nameplate, lo
 
 
 def _ladder_d(drive: Capture, known: Nameplate, losses: Losses, volts: float, steepest_A: float) -> list[Raw]:
-    """Larger and larger currents: each level's steepest change limits the voltage of the next."""
+    """Larger and larger currents: each level's steepest change limits the voltage of the next.
+
+    Nothing holds the current along q at zero: it grows with the time, and moves the rotor by the third power of it. A
+    level that would move it far has two bursts with half of the reversals each."""
     raws: list[Raw] = []
+    parts, moved = 1, 0.0  # bursts of a level; movement of the last one by the third power of its time
     for level in LEVELS:
         top_A = level * known.i_max_A
         share = _of_level(top_A, steepest_A, STEP_D, known, losses, volts)
-        burst = Burst(share, 0.0, (-top_A, TOP_D * known.i_max_A), (-top_A, top_A), REVERSALS_D)
-        raws.append(_checked(record(drive, burst, known), "d", top_A))
-        steepest_A = max(_steepest(raws[-1], share, of_q=False), steepest_A)
+        parts = 2 if moved * (top_A / share) ** 3 > FAR_RAD else parts
+        burst = Burst(share, 0.0, (-top_A, TOP_D * known.i_max_A), (-top_A, top_A), REVERSALS_D // parts)
+        raws += [_checked(record(drive, burst, known), "d", top_A) for _ in range(parts)]
+        moved = raws[-1].moved_rad * (share / top_A) ** 3
+        steepest_A = max(*(_steepest(raw, share, of_q=False) for raw in raws[-parts:]), steepest_A)
     return raws
+
+
+def _not_far_beyond(top_A: float, last_A: float) -> float:
+    """A bound for which the last burst shows how the machine saturates: the next one, or one in the middle."""
+    return top_A if top_A <= FAR_NEXT * last_A else max(0.5 * (top_A + last_A), last_A)
 
 
 def _ladder_q(drive: Capture, known: Nameplate, losses: Losses, volts: float, steepest_A: float) -> list[Taken]:
     """The same along q, with little movement of the rotor."""
     taken: list[Taken] = []
-    for level in LEVELS:
-        top_A = level * known.i_max_A
+    levels = [level * known.i_max_A for level in LEVELS]
+    while levels:
+        top_A = levels[0]
         share = _of_level(top_A, steepest_A, STEP_Q, known, losses, volts)
         waves = Waves(-top_A, top_A, Burst.first, SHORT)
         if taken:
+            last = taken[-1]
+            if share < VOLTAGES[1] and last.expected_rad(top_A, share) > FAR_RAD:
+                top_A = _not_far_beyond(top_A, last.waves.high_A)
+                share = max(share, last.far_share(top_A, known.i_max_A))
             waves = _waves(taken, share, volts, top_A, losses, known.psi_f_Vs)
         burst = _along_q(0.0, share, (-top_A, top_A), waves)
         raw = _checked(record(drive, burst, known), "q", waves.high_A)
         taken.append(Taken(raw, share, waves))
         steepest_A = max(_steepest(raw, share, of_q=True), steepest_A)
+        levels = levels[1:] if top_A == levels[0] else levels
     return taken
 
 
