@@ -4,7 +4,6 @@
 #include "drive/excess_torque.h"
 #include "drive/iron_current.h"
 #include "drive/mrai/mrai_seam.h"
-#include "drive/reachable_target.h"
 #include "drive/safe_decision.h"
 #include "drive/slow_monitors.h"
 #include "drive/step_mean.h"
@@ -183,7 +182,8 @@ static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_
         commanded->flux = flux_table_step(&drive->motor->flux_table, commanded->i);
         task->i_ref = commanded->i;
         task->psi_ref = (dq_q15_t){commanded->flux.psi_d, commanded->flux.psi_q};
-        command.target = reachable_target(drive, snapshot, commanded);
+        command.target = current_control_target(&drive->parameters.current_control, commanded,
+                                                current_control_by_target(snapshot->psi_d_error), &task->rotating);
     } else {
         command.target = (current_target_t){0};
         reset_torque_path(drive);

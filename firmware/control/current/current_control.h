@@ -59,8 +59,7 @@ typedef struct {
 /** r: flux whose rotational voltage the target makes. */
 typedef struct {
     dq_q15_t psi;
-    bool behind;  /* after a change too large to be made at once */
-    bool limited; /* the voltage, at the end of the last step (CC-26) */
+    bool behind; /* after a change too large to be made at once */
 } rotating_flux_t;
 
 typedef struct {

@@ -269,56 +269,6 @@ void test_the_voltage_limit_holds_the_torque_loop(void)
 }
 
 /* Planned at a tracked speed that has changed by so much since the last step. */
-/* Target of the d flux after two steps, at the voltage limit or not, with this d voltage and current. */
-static int32_t target_d_after(double omega_pu, const bool limited[2], q15_t u_d, dq_q15_t i)
-{
-    setUp();
-    slow_monitors_without_machine(&seam.motor);
-    drive.request.current_mode = true;
-    drive.request.i_ref = (dq_q15_t){-3000, 2000};
-    seam_run();
-    for (int n = 0; n < 2; n++) {
-        sample_at(omega_pu, true, limited[n]);
-        sample_t *s = &drive.samples.slot[drive.samples.generation % SAMPLE_SLOTS];
-        s->point.i = i;
-        s->point.flux = flux_table_step(&motor.flux_table, i);
-        s->point.u.d = u_d;
-        task_1khz(&drive);
-    }
-    return command()->target.psi.d;
-}
-
-/* (CC-26) */
-void test_the_d_flux_is_not_asked_to_rise_while_a_positive_d_voltage_stays_limited(void)
-{
-    static const bool lasts[2] = {true, true}, begins[2] = {false, true}, ends[2] = {true, false};
-    const dq_q15_t weak = {-6000, 4000}, strong = {0, 4000};
-    const int32_t wanted = flux_table_step(&motor.flux_table, (dq_q15_t){-3000, 2000}).psi_d;
-    const int32_t measured = flux_table_step(&motor.flux_table, weak).psi_d;
-    TEST_ASSERT_LESS_THAN_INT32(wanted, measured);
-    TEST_ASSERT_EQUAL_INT32(measured, target_d_after(0.8, lasts, 1, weak));
-    TEST_ASSERT_EQUAL_INT32(wanted, drive.task.psi_ref.d);
-    TEST_ASSERT_EQUAL_INT32(drive.task.psi_ref.q, command()->target.psi.q);
-    TEST_ASSERT_EQUAL_INT32(wanted, target_d_after(0.8, lasts, 0, weak));
-    TEST_ASSERT_EQUAL_INT32(wanted, target_d_after(0.8, begins, 1, weak));
-    TEST_ASSERT_EQUAL_INT32(wanted, target_d_after(0.8, ends, 1, weak));
-    TEST_ASSERT_EQUAL_INT32(wanted, target_d_after(0.8, lasts, 1, strong)); /* it may fall */
-    TEST_ASSERT_EQUAL_INT32(wanted, target_d_after(0.1, lasts, 1, weak));   /* no field weakening */
-}
-
-/* What the limit was before switching was disabled does not count when it is enabled again. */
-void test_without_switching_no_voltage_limit_is_remembered(void)
-{
-    seam_run();
-    sample_at(0.3, true, true);
-    task_1khz(&drive);
-    TEST_ASSERT_TRUE(drive.task.rotating.limited);
-    drive.request.enable = false;
-    drive.request.current_mode = true;
-    task_1khz(&drive);
-    TEST_ASSERT_FALSE(drive.task.rotating.limited);
-}
-
 static q15_t planned_flux(double omega_pu, double change_pu)
 {
     setUp();
