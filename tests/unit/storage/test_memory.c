@@ -443,7 +443,7 @@ void test_a_record_whose_compensation_is_refused_leaves_the_priors(void)
 {
     static motor_t m;
     m = motor;
-    m.bridge_duty = 0.11F; /* with it the record's dead time is near the motor data, and still more than a drive takes */
+    m.bridge_duty = 0.11F; /* so that the dead time is near the motor data, and still more than a drive takes */
     drive.task.compensation = (compensation_t){5000, motor.parameters.modulate.knee_q17, 1};
     identify_and_save();
     power_on(&m);
