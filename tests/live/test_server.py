@@ -190,6 +190,13 @@ def serve(drive: Drive, folder: Path, talk: Talk, in_step: InStep | None = None)
     asyncio.run(conversation())
 
 
+class Unconnected:
+    """A viewer without a connection: only its send_str() matters."""
+
+    async def close(self, **_: Any) -> None:
+        """Do nothing."""
+
+
 async def page(client: TestClient[Any, Any]) -> ClientWebSocketResponse:
     """Open a page: connect a socket and receive the greeting."""
     socket = await client.ws_connect("/ws", headers={"Origin": f"http://127.0.0.1:{client.port}"})
@@ -263,7 +270,7 @@ def test_a_bad_message_is_answered_and_changes_nothing(driving: Drive, tmp_path:
 
 
 def test_a_page_that_does_not_read_does_not_delay_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Stuck:
+    class Stuck(Unconnected):
         """A viewer that never takes a batch."""
 
         sent = 0
@@ -272,9 +279,6 @@ def test_a_page_that_does_not_read_does_not_delay_the_others(tmp_path: Path, mon
             Stuck.sent += 1
             assert json.loads(text)["type"] == "rows"
             await asyncio.Event().wait()
-
-        async def close(self, **_: Any) -> None:
-            """Do nothing: there is no connection."""
 
     async def talk(client: TestClient[Any, Any], session: Session) -> None:
         session.viewers.append(Stuck())  # type: ignore[arg-type]
@@ -462,15 +466,12 @@ def test_in_step_no_time_passes_between_the_failure_of_a_connection_and_the_end_
             self.turns += 1
             super().done()
 
-    class Failed:
+    class Failed(Unconnected):
         """A viewer whose connection is lost."""
 
         async def send_str(self, _text: str) -> None:
             failed.set()
             raise ConnectionResetError
-
-        async def close(self, **_: Any) -> None:
-            """Do nothing: there is no connection."""
 
     async def talk(client: TestClient[Any, Any], session: Session) -> None:
         socket = await page(client)
