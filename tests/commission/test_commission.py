@@ -38,7 +38,7 @@ DRAW_RMS = 0.005
 # The winding drops 1.2 V at the largest current; a phase current is near zero at every level; large swings.
 LITTLE_VOLTAGE = [("saturated", 126), ("linear", 138), ("hsm1", 105)]
 # Machine, seed, electrical degrees: the last three are among the five of 40 machines that move most.
-SWINGS = [("pmasynrm", 107, 0.7), ("hsm1", 110, 1.2), ("hsm1", 120, 1.1), ("leaf", 114, 1.2), ("saturated", 116, 1.0)]
+SWINGS = [("pmasynrm", 107, 0.8), ("hsm1", 110, 1.2), ("hsm1", 120, 1.1), ("leaf", 114, 1.2), ("saturated", 116, 1.0)]
 R_LEFT, LEG_V = 0.004, 0.05  # beyond the sensors' gains; 5 mV of 1.2 V; a half per cent of what a leg loses
 
 

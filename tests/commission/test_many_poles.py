@@ -20,7 +20,7 @@ from fluxtrue_tools.sim.motor import Motor
 
 START_DEG_S = 40.0  # electrical: a third of a degree in a burst of the map
 SECONDS = 10.0  # of resistance and map together
-MOST_DEG = {("hsm1", 110): 2.0, ("pmasynrm", 112): 1.2, ("hsm1", 120): 1.3}
+MOST_DEG = {("hsm1", 110): 1.3, ("pmasynrm", 112): 1.0, ("hsm1", 120): 1.0}
 EARLIER = ("phases", "spin", "drag")
 
 

@@ -14,7 +14,7 @@ from fluxtrue_tools.motor.flux_model import Array
 
 FAILURES = {1: "refused", 2: "switching was disabled", 3: "the rotor moved", 4: "the current did not reach its bound",
             5: "the current exceeded the machine's largest"}  # fmt: skip
-REFUSED, MOVED = FAILURES[1], FAILURES[3]
+REFUSED, MOVED, TOO_LARGE = FAILURES[1], FAILURES[3], FAILURES[5]
 STARTS = 6  # of one burst
 PUSHES = 20  # short currents against a light rotor, at most
 FOLLOW_S, FOLLOWED = 0.02, 14  # a heavy rotor: time between two changes of the current, and their number at most
@@ -105,7 +105,7 @@ class Raw:
         """With the voltage that the drive's compensation of the dead time has added, from the second sample on: it goes
         by the currents that the sensors have shown, with their offset, one sample before the voltage acts."""
         shown = self.i * np.exp(1j * self.theta) + offset
-        added = level_V * _legs(shown[:-1], knee_A) * np.exp(-1j * self.theta[1:])
+        added = level_V * legs_vector(shown[:-1], knee_A) * np.exp(-1j * self.theta[1:])
         return replace(self, i=self.i[1:], u=self.u[1:] + added, theta=self.theta[1:], zero=self.zero[1:])
 
 
@@ -269,7 +269,7 @@ class Linkage:
     axes: tuple[float, float]
 
 
-def _legs(i_s: Array, knee_A: float) -> Array:
+def legs_vector(i_s: Array, knee_A: float) -> Array:
     """The vector of three legs whose voltages are sat(i/knee)."""
     total = np.zeros(len(i_s), complex)
     for k in range(3):

@@ -1,16 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a burst's torque turned the rotor, from its own recording: (CM-27), (CM-34)."""
+"""What a burst along q has shown of the machine, from its own recording: (CM-34), (CM-45)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fluxtrue_tools.commission.bursts import Raw, integrate
+from fluxtrue_tools.commission.bursts import Raw, integrate, legs_vector
+from fluxtrue_tools.commission.swing import NOISE, Drift, Machine
 from fluxtrue_tools.motor.flux_model import Array
 
 MAGNET = 3.0  # times the guess of the magnet's flux linkage at most
-FIRST = (0.2, 0.9)  # share of its bound at which the first half wave may end
+BINS = 25  # of the current, up to the largest one
+TOP = 0.4  # of the current: from its last part follows what is beyond it
+BEYOND = 0.6  # times the slope of that part, since saturation goes on
+SETTLED = 3  # samples
+LEGS, LEGS_STEPS = 0.01, 150  # of i_max: the current within which the sign of a phase is uncertain; to both sides
 
 
 @dataclass(frozen=True)
@@ -46,28 +51,62 @@ def magnet_Vs(raws: Sequence[Raw], losses: Losses, guess_Vs: float) -> float:
     return float(np.clip(found, guess_Vs / MAGNET, guess_Vs * MAGNET))
 
 
-def _rise(i_q: Array) -> slice:
-    """From zero to the largest current of a half wave."""
-    top = int(np.argmax(np.abs(i_q)))
-    other = np.flatnonzero(i_q[:top] * i_q[top] <= 0.0)
-    return slice(int(other[-1]) + 1 if len(other) else 0, top + 1)
+def rad_per_torque(raws: Sequence[Raw], losses: Losses, psi_f_Vs: float) -> float:
+    """Electrical angle by a torque, in the square of a period: what the rotor's inertia makes of it."""
+    ways, moved = [], []
+    for raw in raws:
+        psi, turned = _linkages(raw, losses)
+        ways.append(np.cumsum(np.cumsum(_torque(psi + psi_f_Vs * turned, raw.i))))
+        moved.append(raw.theta - raw.theta[0])
+    way, angle = np.concatenate(ways), np.concatenate(moved)
+    return abs(float(way @ angle / (way @ way)))
 
 
-def balanced(
-    raw: Raw, losses: Losses, psi_f_Vs: float, top_A: float, more_A: float = 0.0, more_Vs: float = 0.0,
-    part: float = 0.5,
-) -> float:  # fmt: skip
-    """The share of its bound at which the first half wave along q ends with a part of the impulse of the others: with
-    half of it the rotor swings to one side, (CM-27).
+def _rising(values: Array, i_A: Array) -> Array:
+    """From zero on, and up to twice the largest current, with the slope of the last part."""
+    rising = np.maximum.accumulate(np.maximum(values, 0.0))
+    top = i_A > (1.0 - TOP) * i_A[-1]
+    slope = float(np.polyfit(i_A[top], rising[top], 1)[0]) if np.count_nonzero(top) > 1 else rising[-1] / i_A[-1]
+    return np.concatenate(([0.0], rising, [rising[-1] + BEYOND * slope * i_A[-1]]))
 
-    top_A             bound of the next burst
+
+def machine(raw: Raw, losses: Losses, psi_f_Vs: float, rad_per_torque: float, i_max_A: float, along_d_A: float = 0.0,
+            more_A: float = 0.0, more_Vs: float = 0.0) -> Machine:  # fmt: skip
+    """From means of the samples in bins of the current. At the next bias the torque is that of the currents and flux
+    linkages moved there; the flux linkage along q is taken from this one.
+
+    along_d_A         the bias of the next burst
     more_A, more_Vs   current and flux linkage along d that the next burst has more than this one
     """
     psi, turned = _linkages(raw, losses)
-    rise = _rise(raw.i.imag)
-    torque = _torque(psi + psi_f_Vs * turned + more_Vs, raw.i + more_A)[rise]
-    i_q = raw.i.imag[rise]
-    impulse = np.maximum.accumulate(np.cumsum(torque * np.sign(i_q[-1])))
-    reached = np.maximum.accumulate(np.abs(i_q))
-    wanted = part * float(np.interp(top_A, reached, impulse))
-    return float(np.clip(np.interp(wanted, impulse, reached) / min(top_A, float(reached[-1])), *FIRST))
+    i_q, psi_q = raw.i.imag, psi.imag
+    torque = _torque(psi + psi_f_Vs * turned + more_Vs, raw.i + more_A)
+    size = np.abs(i_q)
+    number = np.minimum((BINS * size / size.max()).astype(int), BINS - 1)
+    filled = np.bincount(number, minlength=BINS)
+
+    def means(values: Array) -> Array:
+        return np.asarray(np.bincount(number, weights=values, minlength=BINS)[filled > 0] / filled[filled > 0])
+
+    i_A = means(size)
+    psi_Vs, torques = (_rising(means(values * np.sign(i_q)), i_A) for values in (psi_q, torque))
+    at_A = LEGS * i_max_A * np.arange(-LEGS_STEPS, LEGS_STEPS + 1)
+    turn = np.exp(1j * raw.theta[-1])
+    legs = (legs_vector((along_d_A + 1j * at_A) * turn, LEGS * i_max_A) * np.conj(turn)).imag
+    return Machine(np.concatenate(([0.0], i_A, [2.0 * i_A[-1]])), psi_Vs + 1e-9 * np.arange(len(psi_Vs)), torques,
+                   losses.r_ohm, at_A, losses.level_V * legs, rad_per_torque, NOISE * i_max_A,
+                   raw.period_s)  # fmt: skip
+
+
+def drift(raw: Raw, losses: Losses, psi_f_Vs: float, rad_per_torque: float, delay: int, next_delay: int) -> Drift:
+    """Before the next burst's pulses along q, by that before the last one's: the current grows with the time.
+
+    delay   periods until the pulses along q begin; without any, as without a bias, there is no drift
+    """
+    if delay < SETTLED:
+        return Drift()
+    psi, turned = _linkages(raw, losses)
+    longer = next_delay / delay
+    speed = rad_per_torque * np.cumsum(_torque(psi + psi_f_Vs * turned, raw.i)[:delay])
+    current_A = float(raw.i.imag[delay - SETTLED : delay].mean())
+    return Drift(current_A * longer, float(speed[-1]) * longer**2, float(speed.sum()) * longer**3)

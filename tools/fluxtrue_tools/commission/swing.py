@@ -1,130 +1,169 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far the pulses along q would move a rotor: the firmware's rule (CM-9) repeated with the machine's response.
+"""Which pulses along q move the rotor little: the firmware's rule (CM-9) repeated with the machine that the last bursts
+have shown, for many voltages and bounds, (CM-45).
 
-Where a voltage changes the current slowly the swing is large, and what is left of the impulses counts: a half wave ends
-at a sample, by up to a whole change of the current below its bound. Bounds at which it ends at the same sample in spite
-of the noise are found by trying many.
+A half wave ends at a sample, by up to a whole change of the current below its bound or beyond it. What that leaves of
+the impulses moves the rotor as far as the swing itself, but it is known beforehand: bounds are found at which a half
+wave ends at the same sample in spite of the noise and of what is not known of the machine.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
-from fluxtrue_tools.commission.bursts import Raw
+from fluxtrue_tools.commission.rule import Rule
 from fluxtrue_tools.motor.flux_model import Array
 
-DRAWS = 12  # of the noise
+DRAWS = 16  # of the noise and of what is uncertain
 PERIODS = 1200  # that are computed; what has not ended by then is not taken
-UNCERTAIN = 0.015  # of the response
-FIRSTS, OTHERS = np.linspace(0.4, 0.8, 21), np.linspace(0.8, 1.0, 11)  # shares of the bound that are tried
-SHORT, LONG = 3, 5  # reversals
-SWING_RAD = 0.0115  # electrical, 0.66 degrees: up to one degree remains for a speed at the start
-SHARES = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75)  # of the bound
+NOISE = 0.003  # of i_max
+UNCERTAIN = 0.04  # of the voltage, which also stands for the flux linkage
+UNCERTAIN_DRIFT = 0.6  # of the drift before the pulses
+LATE = 0.15  # of the largest change in a period: by so much more may the current be than is computed
+FIRSTS, OTHERS = np.linspace(0.25, 0.9, 20), np.linspace(0.75, 1.0, 6)  # shares of the bound that are tried
+TOPS = (1.0, 0.9, 0.8)  # the same
+REVERSALS = 3
+SWING_RAD = 0.011  # electrical, 0.63 degrees: a larger movement counts much more than a smaller current
+LEAST, MOST = 0.75, 0.85  # of the largest current that is possible
+TOO_FAR_RAD = 0.02  # if the rotor moves further in any case, the current becomes as large as MOST
+FARTHER, NEARER = 2.5, 0.15  # what a movement counts against a share of the bound, beyond SWING_RAD and below it
+FASTER = 0.1  # what the highest voltage counts, since it leaves few samples
 
 
 @dataclass(frozen=True)
-class Response:
-    """Of the current along q: its change in a period, and what it turns."""
+class Machine:
+    """What changes and what turns along q at a bias.
 
-    per_volt: float
-    per_A: float
-    of_legs_A: float  # against the current
+    The flux linkage and the torque are odd functions of the current, rising from zero on. What the legs lose is none:
+    at a bias the signs of the phase currents are mostly those of the current along d.
+    """
+
+    i_A: Array
+    psi_Vs: Array
+    torque: Array  # over 1.5 times the pole pairs, in V·s·A
+    r_ohm: float
+    legs_A: Array  # current along q, from the most negative one on
+    legs_V: Array  # along q
+    rad_per_torque: float  # electrical angle, in the square of a period
     noise_A: float
-    rad_per_A: float  # electrical, in the square of a period
+    period_s: float
+
+    def current_A(self, psi_Vs: Array) -> Array:
+        """At a flux linkage."""
+        return np.asarray(np.sign(psi_Vs) * np.interp(np.abs(psi_Vs), self.psi_Vs, self.i_A))
+
+    def linkage_Vs(self, i_A: Array) -> Array:
+        """The inverse."""
+        return np.asarray(np.sign(i_A) * np.interp(np.abs(i_A), self.i_A, self.psi_Vs))
+
+    def torque_of(self, i_A: Array) -> Array:
+        """At a current."""
+        return np.asarray(np.sign(i_A) * np.interp(np.abs(i_A), self.i_A, self.torque))
+
+    def lost_V(self, i_A: Array) -> Array:
+        """By winding and legs."""
+        return np.asarray(self.r_ohm * i_A + np.interp(i_A, self.legs_A, self.legs_V))
 
 
-def response(raw: Raw) -> Response:
-    """From a burst without much saturation."""
-    i, u = raw.i.imag, raw.u.imag
-    middle = 0.5 * (i[1:] + i[:-1])
-    rows = np.column_stack((u[:-1], middle, np.sign(middle)))
-    found = np.linalg.lstsq(rows, np.diff(i), rcond=None)[0]
-    left = np.diff(i) - rows @ found
-    way = np.cumsum(np.cumsum(i))
-    drift = np.column_stack((way, np.arange(len(i)), np.ones(len(i))))
-    turned = float(np.linalg.lstsq(drift, raw.theta, rcond=None)[0][0])
-    return Response(*map(float, found), float(np.std(left)) / 2.0**0.5, abs(turned))
+@dataclass(frozen=True)
+class Drift:
+    """What there is before the pulses: nothing holds the current along q while the one along d goes to its bias."""
 
-
-class _Pulses:
-    """firmware/drive/pulses.c for many bursts at once; bounds in A."""
-
-    def __init__(self, low_A: Array, high_A: Array, first: Array, reversals: int) -> None:
-        self._low, self._high, self._first, self._all = low_A, high_A, first, reversals
-        zero = np.zeros(np.broadcast_shapes(low_A.shape, high_A.shape, first.shape))
-        self.sign, self.ended = zero.copy(), zero > 0.0
-        self._before, self._slope, self._i = zero.copy(), zero.copy(), zero.copy()
-        self._count, self._sum, self._half = zero.copy(), zero.copy(), zero.copy()
-
-    def step(self, i: Array) -> None:
-        """With the sample of a period: the sign of the voltage that acts in the next one."""
-        slope = self._before * (i - self._i)
-        change = np.maximum(slope, 0.0) + np.maximum(slope - self._slope, 0.0)
-        self._slope, self._i, self._before = np.maximum(slope, 0.0), i, self.sign
-        following = i + self.sign * self._slope
-        self._half = np.where(i * self._half >= 0.0, self._half + i, i)
-        self._sum = self._sum + i
-        share = np.where(self._count == 0, self._first, 1.0)
-        down = (self.sign > 0.0) & (following + change >= share * self._high)
-        up = following - change <= share * self._low
-        sign = np.where(down, -1.0, np.where(up, 1.0, self.sign))
-        is_last = (self._count + 1 == self._all) & (self._count > 0)
-        closes = is_last & (self.sign * (self._sum + self._half) >= 0.0) & (self.sign * self._half > 0.0)
-        sign = np.where(self.sign == 0.0, 1.0, np.where(closes, -self.sign, sign))
-        self._count = self._count + (sign * self.sign < 0.0)
-        was, self.ended = self.ended, self.ended | (self._count >= self._all)
-        back = np.where(following > 0.0, -1.0, 1.0)
-        back = np.where(was, np.where(self.sign * following >= 0.0, 0.0, self.sign), back)
-        self.sign = np.where(self.ended, back, sign)
-
-
-def farthest_rad(of: Response, volts: float, top_A: float, first: Array, other: Array, reversals: int) -> Array:
-    """The largest distance of the rotor from its start, for each of the shares, with the worst of some noises."""
-    rng = np.random.default_rng(0)
-    low, high = -other[:, None] * top_A, np.full((1, 1), top_A)
-    pulses = _Pulses(low, high, np.broadcast_to(first[:, None], (len(first), DRAWS)), reversals)
-    gain = of.per_volt * volts * (1.0 + UNCERTAIN * rng.standard_normal((1, DRAWS)))
-    i = speed = angle = far = np.zeros((len(first), DRAWS))
-    acting = np.zeros_like(i)
-    for _ in range(PERIODS):
-        pulses.step(i + of.noise_A * rng.standard_normal((1, DRAWS)))
-        changed = i + gain * acting + of.per_A * i + of.of_legs_A * np.sign(i)
-        i = np.where(pulses.ended & (acting * i <= 0.0) & (changed * i <= 0.0), 0.0, changed)
-        acting = pulses.sign
-        goes_on = ~(pulses.ended & (i == 0.0))
-        speed = speed + of.rad_per_A * i
-        angle = np.where(goes_on, angle + speed, angle)
-        far = np.maximum(far, np.abs(angle))
-        if not goes_on.any():
-            break
-    return np.asarray(np.where(goes_on, np.inf, far).max(axis=1))
+    i_A: float = 0.0
+    speed_rad: float = 0.0  # electrical, in a period
+    angle_rad: float = 0.0
 
 
 @dataclass(frozen=True)
 class Waves:
-    """Half waves along q; where the bounds differ the firmware begins towards the one further from zero."""
+    """Half waves along q; the firmware begins towards the bound that is further from zero, the upper one if both
+    are as far."""
 
     low_A: float
     high_A: float
     first: float  # share of its bound at which the first one ends
-    reversals: int
+
+    @property
+    def top_A(self) -> float:
+        """The larger bound."""
+        return max(self.high_A, -self.low_A)
+
+    def mirrored(self) -> "Waves":
+        """To begin in the other direction; equal bounds would begin upwards."""
+        return Waves(-self.high_A * (1.0 + 1e-3), -self.low_A, self.first)
 
 
-def _best(of: Response, volts: float, top_A: float, reversals: int, others: Array) -> tuple[float, Waves]:
-    """The shares that move the rotor least, and how far."""
-    first, other = (grid.ravel() for grid in np.meshgrid(FIRSTS, others, indexing="ij"))
-    moved = farthest_rad(of, volts, top_A, first, other, reversals)
-    at = int(np.argmin(moved))
-    return float(moved[at]), Waves(-float(other[at]) * top_A, top_A, float(first[at]), reversals)
+@dataclass(frozen=True)
+class Course:
+    """Of some bursts."""
+
+    moved_rad: Array  # the largest distance of the rotor from its start, with the worst of the draws
+    largest_A: Array  # current along q, the same, and LATE
+    reach_A: Array  # mean of the draws' largest currents
 
 
-def quietest(of: Response, volts: float, top_A: float) -> Waves:
-    """Three half waves, by which the rotor swings to one side; if that is too far, five of which those against the
-    first one are smaller, so that it swings by half of it to each side (CM-41); and if even that is too far, a smaller
-    bound. If none is small enough, the last one: the rotor then moves by more than SWING_RAD."""
-    for share in SHARES:
-        for reversals, others in ((SHORT, np.ones(1)), (LONG, OTHERS)):
-            moved_rad, waves = _best(of, volts, share * top_A, reversals, others)
-            if moved_rad < SWING_RAD:
-                return waves
-    return waves
+def course(of: Machine, volts: float, waves: Sequence[Waves], drift: Drift, sign: float = 1.0) -> Course:
+    """All waves begin upwards; with a sign of -1 all of them are mirrored."""
+    rng = np.random.default_rng(0)
+    low, high, first = (np.array([getattr(each, name) for each in waves])[:, None] * np.ones((1, DRAWS))
+                        for name in ("low_A", "high_A", "first"))  # fmt: skip
+    rule = Rule(low, high, first, REVERSALS)
+    gain = of.period_s * volts * (1.0 + UNCERTAIN * rng.standard_normal((1, DRAWS)))
+    drifts = 1.0 + UNCERTAIN_DRIFT * rng.standard_normal((1, DRAWS))
+    i, speed, angle = (np.broadcast_to(drifts * value, low.shape)
+                       for value in (drift.i_A, drift.speed_rad, drift.angle_rad))  # fmt: skip
+    psi, moved, largest = of.linkage_Vs(i), np.abs(angle), np.abs(i)
+    acting = step = np.zeros(low.shape)
+    has_ended = np.zeros(low.shape, bool)
+    for _ in range(PERIODS):
+        rule.step(sign * i + of.noise_A * rng.standard_normal((1, DRAWS)))
+        changed = psi + gain * acting - of.period_s * of.lost_V(i)
+        returns = (acting == 0.0) | ((acting * psi <= 0.0) & (changed * psi <= 0.0))
+        has_ended = has_ended | (rule.ended & returns)
+        psi = np.where(has_ended, 0.0, changed)
+        before, i = i, of.current_A(psi)
+        step = np.maximum(step, np.abs(i) - np.abs(before))
+        acting = sign * rule.sign
+        speed = speed + of.rad_per_torque * of.torque_of(i)
+        angle = np.where(has_ended, angle, angle + speed)
+        moved, largest = np.maximum(moved, np.abs(angle)), np.maximum(largest, np.abs(i))
+        if has_ended.all():
+            break
+    worst = np.where(has_ended, moved, np.inf).max(axis=1)
+    return Course(worst, (largest + LATE * step).max(axis=1), largest.mean(axis=1))
+
+
+def _tried(top_A: float) -> list[Waves]:
+    """Of a voltage."""
+    return [Waves(-other * top * top_A, top * top_A, first)
+            for top, other, first in product(TOPS, map(float, OTHERS), map(float, FIRSTS))]  # fmt: skip
+
+
+def _best(moved_rad: Array, reach_A: Array, price: Array, top_A: float) -> int:
+    """The largest current with a movement that is small enough; if there is none, the smallest movement. Where the
+    rotor moves too far in any case, its map shall be good."""
+    possible = np.isfinite(moved_rad)
+    enough = possible & (reach_A >= LEAST * reach_A[possible].max())
+    if moved_rad[enough].min() > TOO_FAR_RAD:
+        enough = possible & (reach_A >= MOST * reach_A[possible].max())
+    farther = moved_rad / SWING_RAD
+    counts = FARTHER * np.maximum(farther - 1.0, 0.0) + NEARER * farther + price
+    return int(np.argmin(np.where(enough, counts - reach_A / top_A, np.inf)))
+
+
+def quietest(of: Machine, volts: Sequence[float], top_A: float, limit_A: float, drift: Drift
+             ) -> tuple[float, Waves] | None:  # fmt: skip
+    """One of the voltages, and the bounds: up to top_A, with a current of less than limit_A; None if there are none.
+    The first half wave may go in either direction."""
+    moved, reach, price, made = [], [], [], []
+    tried = _tried(top_A)
+    for volt, sign in product(volts, (1.0, -1.0)):
+        found = course(of, volt, tried, drift, sign)
+        moved.append(np.where(found.largest_A < limit_A, found.moved_rad, np.inf))
+        reach.append(found.reach_A)
+        price.append(np.full(len(tried), FASTER * volt / max(volts)))
+        made += [(volt, each if sign > 0.0 else each.mirrored()) for each in tried]
+    moved_rad, reach_A, prices = (np.concatenate(parts) for parts in (moved, reach, price))
+    return made[_best(moved_rad, reach_A, prices, top_A)] if np.isfinite(moved_rad).any() else None
