@@ -8,7 +8,7 @@
  *   i' + s + g >= high: -v;   i' - s - g <= low: +v;   g = max(s - s_1, 0): saturation lets the change grow
  *   The pulses end after a number of reversals of one axis: q if it has a voltage, else d. Two half waves of q are
  *   smaller than the others, so that the alternating torque leaves the rotor in its place and at rest:
- *     the first ends at a share of its bound, where its impulse is half of the next one's;
+ *     the first ends at a share of its bound that is commanded: without saturation 0.71, half of the next impulse;
  *     the last ends where the sum of all i_q, which is about the impulse, will be zero after its way back to zero.
  *   Then both currents are brought to zero.
  * Source   docs/theory/commissioning.md (CM-9), (CM-10)

@@ -251,8 +251,10 @@ def test_a_level_whose_current_was_too_large_is_taken_again(
 
     def taken(_: object, asked_for: Burst, __: object) -> Raw:
         asked.append(asked_for)
-        made = burst(0.0, (30.0, -60.0, 60.0)) if asked_for.v_q else replace(burst(0.0, (9.0, -9.0)), axes=(1.0, 0.0))
-        return replace(made, failure=TOO_LARGE if 2 <= len(asked) < 2 + unlucky else "")
+        is_unlucky = 2 <= len(asked) < 2 + unlucky
+        top = 60.0 + 20.0 * len(asked) if is_unlucky else 60.0
+        made = burst(0.0, (30.0, -top, top)) if asked_for.v_q else replace(burst(0.0, (9.0, -9.0)), axes=(1.0, 0.0))
+        return replace(made, failure=TOO_LARGE if is_unlucky else "")
 
     monkeypatch.setattr(plan, "record", taken)
     monkeypatch.setattr(along_q, "record", taken)
@@ -270,3 +272,5 @@ def test_a_level_whose_current_was_too_large_is_taken_again(
     assert len(asked) == len(raws) + unlucky
     if axis == "d" and unlucky:
         assert asked[2].d[0] == pytest.approx(plan.LESS * asked[1].d[0])
+    if axis == "q" and unlucky:
+        assert asked[2] != asked[1]

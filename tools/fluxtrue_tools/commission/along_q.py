@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A burst along q after the other, each planned so that it moves the rotor little: (CM-45)."""
+"""One burst along q after the other, each planned so that it moves the rotor little: (CM-45)."""
 
 import math
 from dataclasses import dataclass
@@ -10,10 +10,9 @@ from fluxtrue_tools.commission.impulse import Losses, drift, machine, magnet_Vs,
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.swing import REVERSALS, Waves, quietest
 
-VOLTAGES = (0.12, 0.69)  # shares of the largest voltage
 TRIED = (1.0, 1.25, 1.55, 1.9)  # times a burst's voltage: what the computed movement and current choose from
 SMALLER = 0.7  # times its bound, if no current is small enough
-HIGHEST = 0.68  # of them
+HIGHEST = 0.68  # share of the largest voltage up to which they may raise it
 NEWEST = 6  # bursts that show how heavy the rotor is
 SHOWN = 10  # samples of the pulses along q: with fewer a burst shows nothing of the machine
 
@@ -32,7 +31,7 @@ class Taken:
 class Next:
     """A burst along q that is to be planned."""
 
-    share: float  # of the largest voltage: what the movement chooses from begins near it
+    share: float  # of the largest voltage: the lowest that is tried
     top_A: float
     along_d_A: float = 0.0  # the bias
     off_A: float = 0.0  # the largest current along d
@@ -55,7 +54,7 @@ class AlongQ:
         self._newest: Taken | None = None  # also one whose current was too large: it shows the machine none the less
 
     def _quietest(self, following: Next, newest: Taken) -> tuple[float, Waves] | None:
-        """By the model of (CM-45)."""
+        """Share of the voltage and half waves, chosen by (CM-45); None if the current of each may be too large."""
         known, losses = self._known, self._losses
         raws = [each.raw for each in self.taken]
         psi_f_Vs = magnet_Vs(raws, losses, known.psi_f_Vs)

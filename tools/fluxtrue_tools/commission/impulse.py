@@ -70,11 +70,12 @@ def _rising(values: Array, i_A: Array) -> Array:
     return np.concatenate(([0.0], rising, [rising[-1] + BEYOND * slope * i_A[-1]]))
 
 
-def machine(raw: Raw, losses: Losses, psi_f_Vs: float, rad_per_torque: float, i_max_A: float, along_d_A: float = 0.0,
+def machine(raw: Raw, losses: Losses, psi_f_Vs: float, turns: float, i_max_A: float, along_d_A: float = 0.0,
             more_A: float = 0.0, more_Vs: float = 0.0) -> Machine:  # fmt: skip
     """From means of the samples in bins of the current. At the next bias the torque is that of the currents and flux
     linkages moved there; the flux linkage along q is taken from this one.
 
+    turns             what rad_per_torque() has found
     along_d_A         the bias of the next burst
     more_A, more_Vs   current and flux linkage along d that the next burst has more than this one
     """
@@ -94,19 +95,21 @@ def machine(raw: Raw, losses: Losses, psi_f_Vs: float, rad_per_torque: float, i_
     turn = np.exp(1j * raw.theta[-1])
     legs = (legs_vector((along_d_A + 1j * at_A) * turn, LEGS * i_max_A) * np.conj(turn)).imag
     return Machine(np.concatenate(([0.0], i_A, [2.0 * i_A[-1]])), psi_Vs + 1e-9 * np.arange(len(psi_Vs)), torques,
-                   losses.r_ohm, at_A, losses.level_V * legs, rad_per_torque, NOISE * i_max_A,
+                   losses.r_ohm, at_A, losses.level_V * legs, turns, NOISE * i_max_A,
                    raw.period_s)  # fmt: skip
 
 
-def drift(raw: Raw, losses: Losses, psi_f_Vs: float, rad_per_torque: float, delay: int, next_delay: int) -> Drift:
+def drift(raw: Raw, losses: Losses, psi_f_Vs: float, turns: float, delay: int, next_delay: int) -> Drift:
     """Before the next burst's pulses along q, by that before the last one's: the current grows with the time.
 
-    delay   periods until the pulses along q begin; without any, as without a bias, there is no drift
+    turns               what rad_per_torque() has found
+    delay, next_delay   periods until the last and the next burst's pulses along q begin; if the last one had no delay
+                        its drift is not known and counts as zero
     """
     if delay < SETTLED:
         return Drift()
     psi, turned = _linkages(raw, losses)
     longer = next_delay / delay
-    speed = rad_per_torque * np.cumsum(_torque(psi + psi_f_Vs * turned, raw.i)[:delay])
+    speed = turns * np.cumsum(_torque(psi + psi_f_Vs * turned, raw.i)[:delay])
     current_A = float(raw.i.imag[delay - SETTLED : delay].mean())
     return Drift(current_A * longer, float(speed[-1]) * longer**2, float(speed.sum()) * longer**3)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fluxtrue_tools.commission.along_q import VOLTAGES, AlongQ, Next, Taken
+from fluxtrue_tools.commission.along_q import AlongQ, Next, Taken
 from fluxtrue_tools.commission.bursts import TOO_LARGE, Burst, Raw, integrate, record
 from fluxtrue_tools.commission.drive import Capture
 from fluxtrue_tools.commission.impulse import Losses
@@ -16,17 +16,21 @@ from fluxtrue_tools.errors import FluxtrueError
 
 FIRST_VOLTAGE = 0.15  # with the smallest inductance that is allowed for, 0.2 of i_max in a period
 FIRST_CURRENT = 0.1  # of i_max
+VOLTAGES = (0.12, 0.69)  # shares of the largest one
 TOGETHER = 0.8  # root of the sum of the squares of both axes' voltages: beyond it the duties of a phase reach what the
 # bridge can make, (MO-8)
-UNSEEN = 0.55  # of the voltage at most if the highest one would change the current by SLOW or more in a period: a
-# saturation that is not known yet would let the current miss its bound
+UNSEEN = (
+    0.55  # along q of the lowest voltage that is tried: at most so much if the highest one would change the current
+)
+# by SLOW or more in a period, because a saturation that is not known yet would let the current miss its bound
 SLOW = 0.06  # of i_max
 ABOVE_DROP = 1.8  # times what the winding drops
-STEP_D, STEP_Q = 0.12, 0.13  # of i_max: change of the current in a period at most
-BIAS_STEP = 0.15  # of i_max: the same at a bias, where the last burst has shown the steepest change
+STEP_D = 0.12  # of i_max: change of the current in a period at most
+STEP_Q = 0.13  # the same along q, at the lowest voltage that is tried
+BIAS_STEP = 0.15  # the same at a bias, where the last burst has shown the steepest change
 BAND_STEP = 0.06  # of i_max: change of the current along d in a period at a bias, so that it stays in its band
 NEAR = 0.9  # of a bound: beyond it the steepest change is known
-FASTER = 2.0  # at most, from one bias to the next
+FASTER = 2.0  # times the last voltage at most: the lowest one that is tried at the next bias
 GROWTH = 1.3  # of the steepest change, from one level to the next
 LEVELS = (0.35, 0.65, 0.93)  # of i_max
 LEVELS_Q = (0.35, 0.5, 0.65, 0.8, 0.93)  # the same along q: each shows how the machine saturates up to the next one
@@ -160,8 +164,8 @@ def _of_level(top_A: float, steepest_A: float, step: float, known: Nameplate, lo
 
 
 def _within(drive: Capture, burst: Burst, known: Nameplate) -> Raw:
-    """A burst along d. If its current was too large it is taken again with smaller bounds: by how much a current misses
-    its bound differs from burst to burst."""
+    """A burst along d. If its current was too large it is taken again with a smaller lower bound: by how much a current
+    misses its bound differs from burst to burst."""
     for _ in range(AGAIN):
         raw = record(drive, burst, known)
         if raw.failure != TOO_LARGE:

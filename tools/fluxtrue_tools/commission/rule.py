@@ -7,7 +7,8 @@ from fluxtrue_tools.motor.flux_model import Array
 
 
 class Rule:
-    """firmware/drive/pulses.c with one value for each burst; bounds in A. The first half wave is a positive one."""
+    """The axis q of firmware/drive/pulses.c, with one value for each burst; bounds in A. The first half wave is a
+    positive one. The ends by current, movement or time are not computed, and the last period has the full voltage."""
 
     def __init__(self, low_A: Array, high_A: Array, first: Array, reversals: int) -> None:
         self._low, self._high, self._first, self._all = low_A, high_A, first, reversals
@@ -17,7 +18,8 @@ class Rule:
         self._count, self._sum, self._half = zero.copy(), zero.copy(), zero.copy()
 
     def step(self, i: Array) -> None:
-        """With the sample of a period: the sign of the voltage that acts in the next one."""
+        """Take the samples of a period. Then `sign` is that of the voltage in the next one, 0 for none, and `ended`
+        says whether all reversals have happened."""
         slope = self._before * (i - self._i)
         change = np.maximum(slope, 0.0) + np.maximum(slope - self._slope, 0.0)
         self._slope, self._i, self._before = np.maximum(slope, 0.0), i, self.sign

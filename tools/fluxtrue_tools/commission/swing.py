@@ -26,18 +26,19 @@ FIRSTS, OTHERS = np.linspace(0.25, 0.9, 20), np.linspace(0.75, 1.0, 6)  # shares
 TOPS = (1.0, 0.9, 0.8)  # the same
 REVERSALS = 3
 SWING_RAD = 0.011  # electrical, 0.63 degrees: a larger movement counts much more than a smaller current
-LEAST, MOST = 0.75, 0.85  # of the largest current that is possible
-TOO_FAR_RAD = 0.02  # if the rotor moves further in any case, the current becomes as large as MOST
-FARTHER, NEARER = 2.5, 0.15  # what a movement counts against a share of the bound, beyond SWING_RAD and below it
-FASTER = 0.1  # what the highest voltage counts, since it leaves few samples
+REACHED, REACHED_IF_FAR = 0.75, 0.85  # of the largest current that is possible: only choices that reach it count
+TOO_FAR_RAD = 0.02  # if all of these move the rotor further, REACHED_IF_FAR takes the place of REACHED
+OF_MOVEMENT = 0.15  # of the bound: what a movement of SWING_RAD counts
+OF_FAR_MOVEMENT = 2.5  # the same, more for what is beyond SWING_RAD
+OF_VOLTAGE = 0.1  # what the highest voltage counts, since it leaves few samples
 
 
 @dataclass(frozen=True)
 class Machine:
-    """What changes and what turns along q at a bias.
+    """The machine along q at one current along d.
 
-    The flux linkage and the torque are odd functions of the current, rising from zero on. What the legs lose is none:
-    at a bias the signs of the phase currents are mostly those of the current along d.
+    Flux linkage and torque are odd functions of the current along q and are stored for positive currents. The legs'
+    voltage is not odd: at a bias the signs of the phase currents are mostly those of the current along d.
     """
 
     i_A: Array
@@ -97,7 +98,7 @@ class Waves:
 
 @dataclass(frozen=True)
 class Course:
-    """Of some bursts."""
+    """Movement and current of each computed burst."""
 
     moved_rad: Array  # the largest distance of the rotor from its start, with the worst of the draws
     largest_A: Array  # current along q, the same, and LATE
@@ -105,7 +106,7 @@ class Course:
 
 
 def course(of: Machine, volts: float, waves: Sequence[Waves], drift: Drift, sign: float = 1.0) -> Course:
-    """All waves begin upwards; with a sign of -1 all of them are mirrored."""
+    """Movement and currents of bursts with these half waves. All begin upwards; with a sign of -1 all are mirrored."""
     rng = np.random.default_rng(0)
     low, high, first = (np.array([getattr(each, name) for each in waves])[:, None] * np.ones((1, DRAWS))
                         for name in ("low_A", "high_A", "first"))  # fmt: skip
@@ -142,14 +143,17 @@ def _tried(top_A: float) -> list[Waves]:
 
 
 def _best(moved_rad: Array, reach_A: Array, price: Array, top_A: float) -> int:
-    """The largest current with a movement that is small enough; if there is none, the smallest movement. Where the
-    rotor moves too far in any case, its map shall be good."""
+    """Index of the choice with the largest current as a share of top_A, less what its movement and its voltage count.
+    Only those count that reach enough current, so that the map is good.
+
+    price   of the voltages
+    """
     possible = np.isfinite(moved_rad)
-    enough = possible & (reach_A >= LEAST * reach_A[possible].max())
+    enough = possible & (reach_A >= REACHED * reach_A[possible].max())
     if moved_rad[enough].min() > TOO_FAR_RAD:
-        enough = possible & (reach_A >= MOST * reach_A[possible].max())
+        enough = possible & (reach_A >= REACHED_IF_FAR * reach_A[possible].max())
     farther = moved_rad / SWING_RAD
-    counts = FARTHER * np.maximum(farther - 1.0, 0.0) + NEARER * farther + price
+    counts = OF_FAR_MOVEMENT * np.maximum(farther - 1.0, 0.0) + OF_MOVEMENT * farther + price
     return int(np.argmin(np.where(enough, counts - reach_A / top_A, np.inf)))
 
 
@@ -163,7 +167,7 @@ def quietest(of: Machine, volts: Sequence[float], top_A: float, limit_A: float, 
         found = course(of, volt, tried, drift, sign)
         moved.append(np.where(found.largest_A < limit_A, found.moved_rad, np.inf))
         reach.append(found.reach_A)
-        price.append(np.full(len(tried), FASTER * volt / max(volts)))
+        price.append(np.full(len(tried), OF_VOLTAGE * volt / max(volts)))
         made += [(volt, each if sign > 0.0 else each.mirrored()) for each in tried]
     moved_rad, reach_A, prices = (np.concatenate(parts) for parts in (moved, reach, price))
     return made[_best(moved_rad, reach_A, prices, top_A)] if np.isfinite(moved_rad).any() else None
