@@ -167,6 +167,20 @@ def test_off_a_page_that_goes_elsewhere_and_a_closed_tab_end_the_torque_within_1
     assert "closed or silent" in page.text("stopped")
 
 
+def test_a_page_that_is_being_closed_reports_nothing_any_more(page: Page) -> None:
+    """A browser first tells a page that it is left, then that it is hidden, and its script may run for some batches
+    more: with each report of them simulated time, and the torque, went on."""
+    page.drive(125.0)
+    noted(page, "window", "pagehide")
+    page.run("window.dispatchEvent(new PageTransitionEvent('pagehide'));"
+             "Object.defineProperty(document, 'hidden', {value: true, configurable: true});"
+             "document.dispatchEvent(new Event('visibilitychange'));")  # fmt: skip
+    page.until(lambda: page.run("return fluxtrue.stats.batches") > 0 and page.text("state") == "ready", "ready again")
+    page.hide_only(False)
+    is_without_torque_in_time(page, "a page that is left")
+    assert "closed or silent" in page.text("stopped")
+
+
 def test_a_silent_page_loses_its_torque_after_300_ms_and_one_press_on_enable_continues(page: Page) -> None:
     page.drive(60.0)
     silent_s = page.hide(True)

@@ -58,6 +58,15 @@ export function connect(receive, changed) {
   };
 }
 
+// A page that is left ends its connection at once. A page in the background reports each batch when it arrives, and one
+// that is being closed still does so for a moment, during which simulated time and the torque would go on. If the browser
+// keeps the page and shows it again, it connects again.
+export function leave() {
+  if (socket === null) return;
+  socket.onmessage = null;
+  socket.close();
+}
+
 export function watch(changed) {
   let before = true;
   setInterval(() => {

@@ -2,7 +2,7 @@
 // Puts the parts of the page together: one view of what the server has said, shown by every part.
 import { onCapture } from "./capture.js";
 import { chartsChanged, showCharts, startCharts, stats } from "./charts.js";
-import { arrived, connect, isStale, send, sendText, setStale, showConnection, tellDrawn, watch } from "./connection.js";
+import { arrived, connect, isStale, leave, send, sendText, setStale, showConnection, tellDrawn, watch } from "./connection.js";
 import { showControl } from "./control.js";
 import { showFaults, startFaults } from "./faults.js";
 import { showFreezeFrame } from "./freeze.js";
@@ -88,6 +88,7 @@ const HANDLERS = {
 [startTorque, startNumbers, startFaults, startStand, startParameters, startRecording, startReplay, startScope, startWizard].forEach((start) => start());
 startTheme(() => { recolor(); showWizard(view()); });
 document.addEventListener("visibilitychange", () => { if (document.hidden) tellDrawn(); });
+window.addEventListener("pagehide", leave);
 connect((message) => HANDLERS[message.type](message), showAll);
 watch(showAll);
 window.fluxtrue = { ranges, rings, stats, send, sendText, say }; // read by the browser tests
