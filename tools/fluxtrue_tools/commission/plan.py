@@ -19,10 +19,8 @@ FIRST_CURRENT = 0.1  # of i_max
 VOLTAGES = (0.12, 0.69)  # shares of the largest one
 TOGETHER = 0.8  # root of the sum of the squares of both axes' voltages: beyond it the duties of a phase reach what the
 # bridge can make, (MO-8)
-UNSEEN = (
-    0.55  # along q of the lowest voltage that is tried: at most so much if the highest one would change the current
-)
-# by SLOW or more in a period, because a saturation that is not known yet would let the current miss its bound
+UNSEEN = 0.55  # along q of the lowest voltage that is tried: at most so much if the highest would change the current by
+# SLOW or more in a period, because a saturation that is not known yet would let the current miss its bound
 SLOW = 0.06  # of i_max
 ABOVE_DROP = 1.8  # times what the winding drops
 STEP_D = 0.12  # of i_max: change of the current in a period at most
