@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fluxtrue_tools.commission import along_q, impulse, levels, plan, swing
+from fluxtrue_tools.commission import along_q, levels, plan, shown, swing
 from fluxtrue_tools.commission.along_q import AlongQ, Taken
 from fluxtrue_tools.commission.bursts import TOO_LARGE, Burst, Raw, integrate, mean_share, mean_sign
-from fluxtrue_tools.commission.impulse import Losses
 from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.shown import Losses
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
 
@@ -181,36 +181,36 @@ NO_LOSSES, I_MAX = Losses(0.0, 0.0), 250.0
 @pytest.mark.parametrize("i_d", [0.0, -60.0])
 def test_a_burst_shows_how_the_machine_saturates(i_d: float) -> None:
     """Flux linkage and torque at the currents that it has had; and how heavy the rotor is."""
-    raw, next_d = burst(i_d, (150.0, -200.0, 200.0), 60.0), i_d - 30.0
-    turns = impulse.rad_per_torque([raw], NO_LOSSES, PSI_F)
+    last, next_d = shown.shown(burst(i_d, (150.0, -200.0, 200.0), 60.0), NO_LOSSES), i_d - 30.0
+    turns = shown.rad_per_torque([last], PSI_F)
     assert turns == pytest.approx(PER_TORQUE * PERIOD_S**2, rel=0.02)
-    of = impulse.machine(raw, NO_LOSSES, PSI_F, turns, I_MAX, next_d, next_d - i_d, LD * (next_d - i_d))
+    of = shown.machine(last, NO_LOSSES, PSI_F, turns, I_MAX, next_d, next_d - i_d, LD * (next_d - i_d))
     i_q = np.array([30.0, 90.0, 180.0])
     psi_q = LQ * np.where(i_q < 60.0, i_q, 0.5 * (i_q + 60.0))
     assert of.linkage_Vs(i_q) == pytest.approx(psi_q, rel=0.02)
     assert of.torque_of(-i_q) == pytest.approx(-((PSI_F + LD * next_d) * i_q - psi_q * next_d), rel=0.02)
     beyond = float(of.linkage_Vs(np.array([300.0]))[0] - of.linkage_Vs(np.array([200.0]))[0])
-    assert beyond == pytest.approx(impulse.BEYOND * 0.5 * LQ * 100.0, rel=0.1)
+    assert beyond == pytest.approx(shown.BEYOND * 0.5 * LQ * 100.0, rel=0.1)
 
 
 def test_the_drift_before_the_pulses_grows_with_the_delay() -> None:
     """The current with the time, its speed with the square of the time, its angle with the third power."""
     i = np.concatenate((-60.0 - 0.1j * np.arange(1, 31), -60.0 + 1j * np.array([10.0, 60.0, 90.0, 10.0])))
     zero = np.zeros(len(i))
-    raw = Raw(i, zero + 0j, zero, zero, PERIOD_S)
-    short, long = (impulse.drift(raw, NO_LOSSES, PSI_F, 1e-6, 30, delay) for delay in (30, 60))
+    last = shown.shown(Raw(i, zero + 0j, zero, zero, PERIOD_S), NO_LOSSES)
+    short, long = (shown.drift(last, PSI_F, 1e-6, 30, delay) for delay in (30, 60))
     assert short.i_A == pytest.approx(-2.9)
     assert short.speed_rad == pytest.approx(1e-6 * PSI_F * -0.1 * 30 * 31 / 2)
     assert (long.i_A, long.speed_rad) == pytest.approx((2.0 * short.i_A, 4.0 * short.speed_rad))
     assert long.angle_rad == pytest.approx(8.0 * short.angle_rad)
-    assert impulse.drift(raw, NO_LOSSES, PSI_F, 1e-6, 0, 30) == swing.Drift()
+    assert shown.drift(last, PSI_F, 1e-6, 0, 30) == swing.Drift()
 
 
 def test_the_magnet_is_what_it_moves() -> None:
     """Reluctance alone moves as a magnet does, but by another flux linkage at each bias; a guess twice too large."""
-    raws = [burst(i_d, (140.0, -200.0, 200.0), 60.0) for i_d in (0.0, -50.0, -120.0)]
-    assert impulse.magnet_Vs(raws, NO_LOSSES, 2.0 * PSI_F) == pytest.approx(PSI_F, rel=0.02)
-    assert impulse.magnet_Vs(raws, NO_LOSSES, 10.0 * PSI_F) == pytest.approx(10.0 / impulse.MAGNET * PSI_F)
+    bursts = [shown.shown(burst(i_d, (140.0, -200.0, 200.0), 60.0), NO_LOSSES) for i_d in (0.0, -50.0, -120.0)]
+    assert shown.magnet_Vs(bursts, 2.0 * PSI_F) == pytest.approx(PSI_F, rel=0.02)
+    assert shown.magnet_Vs(bursts, 10.0 * PSI_F) == pytest.approx(10.0 / shown.MAGNET * PSI_F)
 
 
 OFF = 50.0  # A: the largest current along d of the next burst
@@ -219,7 +219,7 @@ OFF = 50.0  # A: the largest current along d of the next burst
 def test_a_burst_at_a_bias_is_at_most_twice_as_fast_as_the_last_one() -> None:
     i_q = 0.01 * I_MAX * np.array([0.0, 1.0, 2.0, 1.0, 0.0])
     last = Raw(1j * i_q, np.zeros(5), np.linspace(0.0, 0.1, 5), np.zeros(5), PERIOD_S)
-    following, top_A = plan.at_bias([Taken(last, 0.2)], OFF, I_MAX)
+    following, top_A = plan.at_bias([Taken(shown.shown(last, NO_LOSSES), 0.2)], OFF, I_MAX)
     assert following == pytest.approx(2.0 * 0.2)
     assert math.hypot(top_A, OFF) == pytest.approx(0.93 * I_MAX)
 
@@ -232,7 +232,7 @@ def test_a_burst_that_ended_early_does_not_show_the_steepest_change(reached: flo
     before = Raw(1j * bound * np.array([0.0, 0.5, 1.0, 0.5, 0.0]), zero, zero, zero, PERIOD_S)
     steady = np.arange(0.0, reached * bound, 0.15 * I_MAX)
     last = Raw(1j * np.append(steady, reached * bound), *(np.zeros(len(steady) + 1),) * 3, PERIOD_S)
-    taken = [Taken(raw, share) for raw in (before, last)]
+    taken = [Taken(shown.shown(raw, NO_LOSSES), share) for raw in (before, last)]
     following, _ = plan.at_bias(taken, OFF, I_MAX)
     steepest_A = 0.15 * I_MAX if reached > plan.NEAR else 0.5 * bound
     assert following == pytest.approx(share * 0.15 * I_MAX / steepest_A)

@@ -10,8 +10,8 @@ import pytest
 from fluxtrue_tools.commission import along_q, hidden, plan
 from fluxtrue_tools.commission.bursts import FAILURES, STARTS, Burst, Raw, record
 from fluxtrue_tools.commission.drive import SIGNALS, Capture, SoftwareInTheLoop
-from fluxtrue_tools.commission.impulse import Losses
 from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.shown import Losses
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
 from fluxtrue_tools.sim.library import Loop

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from watched import Watched
 
-from fluxtrue_tools.commission import along_q, hidden, impulse, swing
+from fluxtrue_tools.commission import along_q, hidden, shown, swing
 from fluxtrue_tools.commission.bursts import Raw, record
-from fluxtrue_tools.commission.impulse import Losses
 from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.shown import Losses
 from fluxtrue_tools.commission.steps import _enable
 from fluxtrue_tools.commission.swing import Drift, Machine, Waves
 from fluxtrue_tools.sim.library import Loop
@@ -114,8 +114,9 @@ def test_the_machine_of_a_recorded_burst(small: Motor, plate: Nameplate, monkeyp
     drive, plant, raw = recorded(small, plate)
     losses = Losses(plant["r_ohm_20"], plant["dead_time_s"] * plant["pwm_hz"] * plant["vdc_V"])
     psi_f_Vs, pairs = plant["psi_f_Vs"] * plant["magnet_scale"], plant["pole_pairs"]
-    turns = impulse.rad_per_torque([raw], losses, psi_f_Vs)
-    of = impulse.machine(raw, losses, psi_f_Vs, turns, plate.i_max_A)
+    last = shown.shown(raw, losses)
+    turns = shown.rad_per_torque([last], psi_f_Vs)
+    of = shown.machine(last, losses, psi_f_Vs, turns, plate.i_max_A)
     print(of, math.degrees(raw.moved_rad))
     assert of.linkage_Vs(np.array([20.0, -20.0])) == pytest.approx(
         plant["lq_H"] * plant["lq_scale"] * np.array([20.0, -20.0]), rel=0.03
@@ -131,7 +132,8 @@ def test_at_a_bias_the_legs_lose_what_the_current_along_d_makes_them_lose(small:
     raw = recorded(small, plate)[2]
     raw = replace(raw, theta=raw.theta - raw.theta[-1] + 0.3)
     losses = Losses(0.05, 1.5)
-    of = [impulse.machine(raw, losses, 0.01, 1e-9, plate.i_max_A, along_d_A=bias) for bias in (0.0, -20.0)]
+    last = shown.shown(raw, losses)
+    of = [shown.machine(last, losses, 0.01, 1e-9, plate.i_max_A, along_d_A=bias) for bias in (0.0, -20.0)]
     at_zero = [float(each.lost_V(np.array([0.0]))[0]) for each in of]
     theta = float(raw.theta[-1])
     phases = [-math.copysign(1.0, math.cos(theta - 2.0 * math.pi * k / 3.0)) for k in range(3)]

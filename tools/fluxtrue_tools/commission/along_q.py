@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from fluxtrue_tools.commission.bursts import TOO_LARGE, Burst, Raw, record
 from fluxtrue_tools.commission.drive import Capture
-from fluxtrue_tools.commission.impulse import Losses, drift, machine, magnet_Vs, rad_per_torque
 from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.shown import Losses, Shown, drift, machine, magnet_Vs, rad_per_torque, shown
 from fluxtrue_tools.commission.swing import REVERSALS, Waves, quietest
 
 TRIED = (1.0, 1.25, 1.55, 1.9)  # times a burst's voltage: what the computed movement and current choose from
@@ -21,7 +21,7 @@ SHOWN = 10  # samples of the pulses along q: with fewer a burst shows nothing of
 class Taken:
     """A burst along q from which the next one is planned."""
 
-    raw: Raw
+    of: Shown
     share: float  # of the largest voltage
     along_d_A: float = 0.0
     delay: int = 0
@@ -56,16 +56,16 @@ class AlongQ:
     def _quietest(self, following: Next, newest: Taken) -> tuple[float, Waves] | None:
         """Share of the voltage and half waves, chosen by (CM-45); None if the current of each may be too large."""
         known, losses = self._known, self._losses
-        raws = [each.raw for each in self.taken]
-        psi_f_Vs = magnet_Vs(raws, losses, known.psi_f_Vs)
-        turns = rad_per_torque(raws[-NEWEST:], losses, psi_f_Vs)
+        bursts = [each.of for each in self.taken]
+        psi_f_Vs = magnet_Vs(bursts, known.psi_f_Vs)
+        turns = rad_per_torque(bursts[-NEWEST:], psi_f_Vs)
         more_A = following.along_d_A - newest.along_d_A
-        shown = machine(newest.raw, losses, psi_f_Vs, turns, known.i_max_A, following.along_d_A, more_A,
+        along = machine(newest.of, losses, psi_f_Vs, turns, known.i_max_A, following.along_d_A, more_A,
                         self._l_d_H * more_A)  # fmt: skip
-        before = drift(newest.raw, losses, psi_f_Vs, turns, newest.delay, following.delay)
+        before = drift(newest.of, psi_f_Vs, turns, newest.delay, following.delay)
         limit_A = math.sqrt(known.i_max_A**2 - following.off_A**2)
         shares = sorted({min(step * following.share, max(following.share, HIGHEST)) for step in TRIED})
-        chosen = quietest(shown, [share * self._volts for share in shares], following.top_A, limit_A, before)
+        chosen = quietest(along, [share * self._volts for share in shares], following.top_A, limit_A, before)
         return None if chosen is None else (chosen[0] / self._volts, chosen[1])
 
     def waves(self, following: Next) -> tuple[float, Waves]:
@@ -80,7 +80,7 @@ class AlongQ:
     def record(self, v_d: float, share: float, d: tuple[float, float], waves: Waves, following: Next) -> Raw:
         """A burst, from which the next one is planned."""
         raw = record(self._drive, burst(v_d, share, d, waves, following.delay), self._known)
-        taken = Taken(raw, share, following.along_d_A, following.delay)
+        taken = Taken(shown(raw, self._losses), share, following.along_d_A, following.delay)
         if (raw.is_valid or raw.failure == TOO_LARGE) and len(raw.i) > following.delay + SHOWN:
             self._newest = taken
         if raw.is_valid:

@@ -10,8 +10,8 @@ import numpy as np
 from fluxtrue_tools.commission.along_q import AlongQ, Next, Taken
 from fluxtrue_tools.commission.bursts import TOO_LARGE, Burst, Raw, integrate, record
 from fluxtrue_tools.commission.drive import Capture
-from fluxtrue_tools.commission.impulse import Losses
 from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.shown import Losses
 from fluxtrue_tools.errors import FluxtrueError
 
 FIRST_VOLTAGE = 0.15  # with the smallest inductance that is allowed for, 0.2 of i_max in a period
@@ -139,9 +139,9 @@ def at_bias(seen: Sequence[Taken], off_A: float, i_max_A: float) -> tuple[float,
     off_A   the largest current along d
     """
     last, top_A = seen[-1], math.sqrt((LEVELS_Q[-1] * i_max_A) ** 2 - off_A**2)
-    trusted = seen[-1:] if np.abs(last.raw.i.imag).max() > NEAR * top_A else seen
-    steepest_A = max(_steepest_within(each.raw, each.share, top_A) for each in trusted)
-    highest = _highest(_steepest(last.raw, last.share, of_q=True), i_max_A)
+    trusted = seen[-1:] if np.abs(last.of.raw.i.imag).max() > NEAR * top_A else seen
+    steepest_A = max(_steepest_within(each.of.raw, each.share, top_A) for each in trusted)
+    highest = _highest(_steepest(last.of.raw, last.share, of_q=True), i_max_A)
     return min(_voltage(steepest_A, i_max_A, BIAS_STEP), FASTER * last.share, highest), top_A
 
 
@@ -211,11 +211,11 @@ def _at_biases(along: AlongQ, drive: Capture, found: First, known: Nameplate) ->
     """Along q at each bias of d."""
     i_max_A, steep_d = known.i_max_A, found.volts * drive.period_s / found.l_d_H
     band = BAND * i_max_A
+    v_d = min(_voltage(steep_d, i_max_A, BAND_STEP), math.sqrt(TOGETHER**2 - VOLTAGES[1] ** 2))
     raws = []
     for bias in np.repeat(BIASES, BURSTS):
         target, off_A = -bias * i_max_A, (bias + BAND) * i_max_A
         share, top_A = at_bias(along.taken[-2:], off_A, i_max_A)
-        v_d = min(_voltage(steep_d, i_max_A, BAND_STEP), math.sqrt(TOGETHER**2 - VOLTAGES[1] ** 2))
         delay = math.ceil(TRAVEL * bias * i_max_A / (v_d * steep_d))
         following = Next(share, top_A, target, off_A, delay)
         share, waves = along.waves(following)

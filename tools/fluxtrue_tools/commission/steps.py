@@ -17,9 +17,9 @@ from fluxtrue_tools.commission.bus import OverTheBus
 from fluxtrue_tools.commission.connection import Followed
 from fluxtrue_tools.commission.drag import Drag
 from fluxtrue_tools.commission.drive import Capture, nothing
-from fluxtrue_tools.commission.impulse import Losses
 from fluxtrue_tools.commission.levels import Resistance
 from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.shown import Losses
 from fluxtrue_tools.commission.spin import Spun
 from fluxtrue_tools.commission.surface import Surface
 from fluxtrue_tools.errors import FluxtrueError
