@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bounds of the campaign on machine models of other projects: motulator with saturation, and gym-electric-motor.
 
-FLUXTRUE_PLANTS=20 draws twenty plants for each model instead of two."""
+FLUXTRUE_PLANTS=20 draws twenty plants for each model instead of one."""
 
 import math
 import os
@@ -21,7 +21,7 @@ from sil import OK, Drive, load_library
 from fluxtrue_tools.sim.build import prepare
 
 MOTORS = Path(__file__).resolve().parents[1] / "motors"
-PLANTS = int(os.environ.get("FLUXTRUE_PLANTS", "2"))
+PLANTS = int(os.environ.get("FLUXTRUE_PLANTS", "1"))
 SEED = 77003
 PERIOD_S, SUBSTEPS, VDC_V = 1e-4, 4, 350.0
 SIMPSON = np.array([1, 4, 2, 4, 1]) / 12.0
