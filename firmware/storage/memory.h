@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef STORAGE_MEMORY_H
 #define STORAGE_MEMORY_H
-/** Keeps the identified values over a power cycle, in the store's flash slots.
+/** Keeps the identified values, the measured compensation of the dead time and its trim over a power cycle, in the
+ * store's flash slots.
  *   layout = CRC-32 of the record's version, the motor's name, its bases and the priors that scale the values: a record
  *     of another firmware, another motor or other priors is not used
  *   A save needs a run since the last save, MEMORY_REST_MS at standstill with switching disabled and no fault, a
