@@ -278,6 +278,16 @@ def legs_vector(i_s: Array, knee_A: float) -> Array:
     return total
 
 
+def legs_of(i_s: Array, knee_A: float) -> Array:
+    """The vector of three legs that lose 1 V at large currents; a knee of 0 is that of a constant voltage."""
+    total = np.zeros(i_s.shape, complex)
+    for k in range(3):
+        axis = np.exp(2j * np.pi * k / 3.0)
+        i = (i_s * np.conj(axis)).real
+        total += 2.0 / 3.0 * axis * (leg_share(i, knee_A) if knee_A > 0.0 else np.sign(i))
+    return total
+
+
 def mean_sign(begins: Array, ends: Array) -> Array:
     """Of currents that change along straight lines from begins to ends: (CM-25)."""
     change = ends - begins
@@ -286,14 +296,14 @@ def mean_sign(begins: Array, ends: Array) -> Array:
     )
 
 
-def _share(i: Array, knee_A: float) -> Array:
+def leg_share(i: Array, knee_A: float) -> Array:
     """Of its voltage, with its sign, that a leg loses at a current: (CM-33)."""
     over = np.abs(i) / knee_A
     return np.sign(i) * np.where(over < 1.0, 0.5 * over, 1.0 - 0.5 / np.maximum(over, 1.0))
 
 
 def _area(i: Array, knee_A: float) -> Array:
-    """The integral of _share() from zero on."""
+    """The integral of leg_share() from zero on."""
     over = np.abs(i) / knee_A
     beyond = np.maximum(over, 1.0)
     return knee_A * np.where(over < 1.0, 0.25 * over * over, beyond - 0.5 * np.log(beyond) - 0.75)
@@ -306,7 +316,7 @@ def mean_share(begins: Array, ends: Array, knee_A: float) -> Array:
     change = ends - begins
     steady = np.abs(change) < STEADY * knee_A
     means = (_area(ends, knee_A) - _area(begins, knee_A)) / np.where(steady, 1.0, change)
-    return np.where(steady, _share(0.5 * (begins + ends), knee_A), means)
+    return np.where(steady, leg_share(0.5 * (begins + ends), knee_A), means)
 
 
 def of_legs(i_s: Array, knee_A: float) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from fluxtrue_tools.commission.along_q import AlongQ, Next, Taken
 from fluxtrue_tools.commission.bursts import TOO_LARGE, Burst, Raw, integrate, record
 from fluxtrue_tools.commission.drive import Capture
+from fluxtrue_tools.commission.first_inductance import inductance_H
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.shown import Losses
 from fluxtrue_tools.errors import FluxtrueError
@@ -74,21 +75,26 @@ class Legs:
     compensated_knee_A: float
 
 
-def _inductance(raw: Raw, losses: Losses, of_q: bool, knee_A: float = 0.0) -> float:
+def _positive(found_H: float, of_q: bool) -> float:
+    """An inductance, or the reason why there is none."""
+    if not found_H > 0.0:
+        raise FluxtrueError(f"commission: an inductance of {found_H:g} H in the {'q' if of_q else 'd'} axis: phases or "
+                            "sensors are not connected as assumed")  # fmt: skip
+    return found_H
+
+
+def _inductance(raw: Raw, losses: Losses, of_q: bool) -> float:
     """Slope of the flux linkage over the current of one axis."""
-    linkage = integrate(raw, losses.r_ohm, knee_A)
+    linkage = integrate(raw, losses.r_ohm)
     psi = linkage.psi + losses.level_V * linkage.of_level
     slope = float(np.polyfit(*((linkage.i.imag, psi.imag) if of_q else (linkage.i.real, psi.real)), 1)[0])
-    if not slope > 0.0:
-        raise FluxtrueError(f"commission: an inductance of {slope:g} H in the {'q' if of_q else 'd'} axis: phases or "
-                            "sensors are not connected as assumed")  # fmt: skip
-    return slope
+    return _positive(slope, of_q)
 
 
 def _exact(raw: Raw, known: Nameplate, r_ohm: float, legs: Legs, of_q: bool) -> float:
     """With the voltage that the drive's compensation has added, (CM-12), and all that the legs lose."""
     acting = raw.compensated(known.offset_A, legs.compensated_V, legs.compensated_knee_A)
-    return _inductance(acting, Losses(r_ohm, legs.total_V), of_q, legs.knee_A)
+    return _positive(inductance_H(acting, r_ohm, legs.total_V, legs.knee_A, of_q), of_q)
 
 
 def first(drive: Capture, known: Nameplate, losses: Losses, legs: Legs | None = None) -> First:
