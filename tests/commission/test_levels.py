@@ -241,6 +241,16 @@ def test_a_burst_that_ended_early_does_not_show_the_steepest_change(reached: flo
 KNOWN = Nameplate(I_MAX, 12000.0, R_OHM, PSI_F, 4, 0.07, LEG_V, 1.0)
 
 
+class Standing:
+    """A drive whose rotor stands at zero."""
+
+    def get(self, _: str) -> float:
+        return 0.0
+
+    def rest(self, _: float) -> None:
+        pass
+
+
 @pytest.mark.parametrize(("unlucky", "succeeds"), [(0, True), (plan.AGAIN, True), (plan.AGAIN + 1, False)])
 @pytest.mark.parametrize("axis", ["d", "q"])
 def test_a_level_whose_current_was_too_large_is_taken_again(
@@ -260,7 +270,7 @@ def test_a_level_whose_current_was_too_large_is_taken_again(
     monkeypatch.setattr(along_q, "record", taken)
     monkeypatch.setattr(swing, "DRAWS", 2)
     monkeypatch.setattr(swing, "PERIODS", 150)
-    along = AlongQ(None, KNOWN, NO_LOSSES, 200.0, LD)
+    along = AlongQ(Standing(), KNOWN, NO_LOSSES, 200.0, LD)
     measure = {"d": lambda: plan._ladder_d(None, KNOWN, NO_LOSSES, 200.0, 60.0),
                "q": lambda: plan._ladder_q(along, KNOWN, NO_LOSSES, 200.0, 40.0)}[axis]  # fmt: skip
     if not succeeds:
@@ -274,3 +284,18 @@ def test_a_level_whose_current_was_too_large_is_taken_again(
         assert asked[2].d[0] == pytest.approx(plan.LESS * asked[1].d[0])
     if axis == "q" and unlucky:
         assert asked[2] != asked[1]
+
+
+def test_the_first_burst_along_q_is_taken_again_with_a_smaller_current(monkeypatch: pytest.MonkeyPatch) -> None:
+    """There is no valid burst yet from which its current could be computed."""
+    asked: list[Burst] = []
+
+    def taken(_: object, asked_for: Burst, __: object) -> Raw:
+        asked.append(asked_for)
+        return replace(burst(0.0, (30.0, -60.0, 60.0)), failure=TOO_LARGE if len(asked) == 1 else "")
+
+    monkeypatch.setattr(along_q, "record", taken)
+    monkeypatch.setattr(swing, "DRAWS", 2)
+    monkeypatch.setattr(swing, "PERIODS", 150)
+    plan._ladder_q(AlongQ(Standing(), KNOWN, NO_LOSSES, 200.0, LD), KNOWN, NO_LOSSES, 200.0, 40.0)
+    assert asked[1].q == pytest.approx(tuple(along_q.SMALLER * bound for bound in asked[0].q))

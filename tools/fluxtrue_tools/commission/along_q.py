@@ -2,10 +2,10 @@
 """One burst along q after the other, each planned so that it moves the rotor little: (CM-45)."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from fluxtrue_tools.commission.bursts import TOO_LARGE, Burst, Raw, record
-from fluxtrue_tools.commission.drive import Capture
+from fluxtrue_tools.commission.bursts import TOO_LARGE, Burst, Raw, record, shift
+from fluxtrue_tools.commission.drive import STANDING_RPM, Capture
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.shown import Losses, Shown, drift, machine, magnet_Vs, rad_per_torque, shown
 from fluxtrue_tools.commission.swing import REVERSALS, Waves, quietest
@@ -60,22 +60,28 @@ class AlongQ:
         psi_f_Vs = magnet_Vs(bursts, known.psi_f_Vs)
         turns = rad_per_torque(bursts[-NEWEST:], psi_f_Vs)
         more_A = following.along_d_A - newest.along_d_A
-        along = machine(newest.of, losses, psi_f_Vs, turns, known.i_max_A, following.along_d_A, more_A,
+        pulses = newest.of.since(newest.delay)
+        along = machine(pulses, losses, psi_f_Vs, turns, known.i_max_A, following.along_d_A, more_A,
                         self._l_d_H * more_A)  # fmt: skip
+        along = replace(along, offset_A=shift(self._drive, known).imag)
         before = drift(newest.of, psi_f_Vs, turns, newest.delay, following.delay)
+        left_rad_s = STANDING_RPM * math.pi / 30.0 * known.pole_pairs
+        before = replace(before, uncertain_rad=left_rad_s * newest.of.raw.period_s)
         limit_A = math.sqrt(known.i_max_A**2 - following.off_A**2)
         shares = sorted({min(step * following.share, max(following.share, HIGHEST)) for step in TRIED})
-        chosen = quietest(along, [share * self._volts for share in shares], following.top_A, limit_A, before)
+        chosen = quietest(along, [share * self._volts for share in shares], following.top_A, limit_A, before,
+                          self._drive.rest)  # fmt: skip
         return None if chosen is None else (chosen[0] / self._volts, chosen[1])
 
     def waves(self, following: Next) -> tuple[float, Waves]:
         """Share of the voltage and half waves. The first burst, and one that has no current that is small enough, have
-        the balance of a machine without saturation; the latter has a smaller bound."""
+        the balance of a machine without saturation; the latter has a smaller bound, as has a first burst that is taken
+        again."""
         plain = Waves(-following.top_A, following.top_A, Burst.first)
-        if self._newest is None or not self.taken:
+        if self._newest is None:
             return following.share, plain
         smaller = Waves(SMALLER * plain.low_A, SMALLER * plain.high_A, plain.first)
-        return self._quietest(following, self._newest) or (following.share, smaller)
+        return (self._quietest(following, self._newest) if self.taken else None) or (following.share, smaller)
 
     def record(self, v_d: float, share: float, d: tuple[float, float], waves: Waves, following: Next) -> Raw:
         """A burst, from which the next one is planned."""

@@ -26,7 +26,15 @@ LIGHT, HEAVY = (0.1, 100.0), 0.5  # range of the lightness; up to HEAVY a rotor 
 ADAPTED, ADAPTED_LITTLE = 16.0, 2.0  # times at most that a current may show; the lightness changes by the root of it
 REST_S = 0.005  # before a burst: the drive sees that the rotor stands
 TURN = 2.0 * math.pi
+CLOSER = 0.998  # times a bound: safely closer to zero, also in the firmware's steps of the current
 STEADY = 1e-6  # of a knee: a current that does not change in a period
+
+
+def shown_bounds(low_A: float, high_A: float, by_A: float) -> tuple[float, float]:
+    """Bounds for currents that the sensors show larger by by_A. The firmware begins towards the bound that is further
+    from zero, the upper one if both are as far: so that it begins in the same direction, the other one gives way."""
+    low, high = low_A + by_A, high_A + by_A
+    return (max(low, -high), high) if high_A >= -low_A else (low, min(high, -CLOSER * low))
 
 
 @dataclass(frozen=True)
@@ -50,8 +58,7 @@ class Burst:
 
     def shifted(self, by_A: complex) -> "Burst":
         """The same pulses with bounds for the currents that the sensors will show."""
-        d, q = by_A.real, by_A.imag
-        return replace(self, d=(self.d[0] + d, self.d[1] + d), q=(self.q[0] + q, self.q[1] + q))
+        return replace(self, d=shown_bounds(*self.d, by_A.real), q=shown_bounds(*self.q, by_A.imag))
 
     def values(self) -> dict[str, float]:
         """The values by their names in the firmware."""
@@ -120,8 +127,8 @@ def _phase_word(drive: Capture) -> str:
     return FAILURES.get(int(drive.get("pulses_failure")), "") if drive.get("pulses") == FAILED else ""
 
 
-def _shift(drive: Capture, known: Nameplate) -> complex:
-    """What the current sensors show without current, in the rotor frame now."""
+def shift(drive: Capture, known: Nameplate) -> complex:
+    """In A, what the current sensors show without current, in the rotor frame now."""
     return complex(known.offset_A * np.exp(-1j * drive.get("theta_e_rad")))
 
 
@@ -176,7 +183,7 @@ def _strike_once(drive: Capture, known: Nameplate, speed_rpm: float) -> float:
     top_A = _bound_A(drive, known, speed_rpm)
     q = (0.0, top_A) if speed_rpm < 0.0 else (-top_A, 0.0)
     burst = Burst(0.0, STRIKE_VOLTAGE, (-top_A, top_A), q, reversals=1, first=1.0, angle_deg=known.swing_deg)
-    drive.pulse(burst.shifted(_shift(drive, known)).values())
+    drive.pulse(burst.shifted(shift(drive, known)).values())
     drive.hold(known.offset_A)
     after = drive.speed_rpm(FOLLOW_S)
     changed = (speed_rpm - after) * math.copysign(1.0, speed_rpm)
@@ -223,7 +230,7 @@ def _started(drive: Capture, burst: Burst, known: Nameplate) -> Array:
     """The rows of a burst. A step of the angle sensor is a jump of the measured speed, with which the firmware refuses
     a start even at a standstill: it is tried again."""
     for _ in range(STARTS):
-        values = replace(burst, angle_deg=known.swing_deg).shifted(_shift(drive, known)).values()
+        values = replace(burst, angle_deg=known.swing_deg).shifted(shift(drive, known)).values()
         # Before the rotor is brought to a standstill, which does not last. A turn of it meanwhile changes the bounds by
         # twice the offsets of the sensors at most.
         drive.prepare(values)

@@ -35,7 +35,8 @@ MOTORS = ROOT / "tests" / "motors"
 FOLDER, SMALL_FOLDER = MOTORS / "unknown", MOTORS / "unknown_48V"
 NAMEPLATES = {FOLDER.name: KINDS, SMALL_FOLDER.name: SMALL}
 FIRST_SEED = 100
-MOVEMENT = "movement, deg"  # of the rotor in a burst of the map's pulses, electrical, from where it stood
+MOVEMENT = "movement, deg"  # of the machine's rotor in a burst of the map's pulses, electrical, from where it stood
+SHOWN_MOVEMENT = "movement that the sensor shows, deg"  # in steps of up to 0.2 degrees
 LARGEST, FASTEST = "largest current, % of i_max", "largest speed, % of the nameplate's"
 OFFSETS, LEG, FIRST_L = ("offsets of the current sensors, % of the full scale",
                          "leg voltage, % of the nameplate's error", "L of the first pulses, %")  # fmt: skip
@@ -66,7 +67,7 @@ def _standing(found: Found, truth: hidden.Truth, known: Nameplate) -> dict[str, 
             "gain balance, %": 100.0 * errors["balance"], OFFSETS: 100.0 * errors["sensor_offset"],
             LEG: 100.0 * errors["leg_left"], FIRST_L: 100.0 * errors["l_error"],
             LARGEST: 100.0 * found.largest_A / known.i_max_A,
-            MOVEMENT: float(np.degrees(found.moved_rad))}  # fmt: skip
+            SHOWN_MOVEMENT: float(np.degrees(found.moved_rad))}  # fmt: skip
 
 
 def _turning(found: Found, truth: hidden.Truth) -> dict[str, float]:
@@ -84,11 +85,13 @@ def one(name: str, seed: int, folder: Path, connected: bool, other_errors: bool)
     truth, flux_map, plant = hidden.draw(name, seed, motor, known.i_max_A, connected, other_errors)
     drive = Metered(Loop(motor.library, plant, flux_map))
     try:
-        found = run(drive, chosen(("map",) if connected else (ALL,)), known, lambda _: None)
+        steps = chosen(("map",) if connected else (ALL,))
+        found = run(drive, steps, known, lambda _: None, shown=drive.in_step)
     except FluxtrueError as error:
         click.echo(f"{name:10} {seed}  refused: {error}")
         return None
-    values = _standing(found, truth, known)
+    moves_rad = plant["pole_pairs"] * np.array(drive.of_steps["map"])
+    values = {MOVEMENT: float(np.degrees(moves_rad.max()))} | _standing(found, truth, known)
     if not connected:
         values |= _turning(found, truth)
         values[FASTEST] = 100.0 * drive.fastest_rad_s / (known.speed_max_rpm * math.pi / 30.0)

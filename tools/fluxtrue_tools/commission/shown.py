@@ -2,7 +2,7 @@
 """What a burst along q has shown of the machine, from its own recording: (CM-34), (CM-45)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,6 +38,12 @@ class Shown:
     def torque(self, psi_f_Vs: float, more_A: float = 0.0, more_Vs: float = 0.0) -> Array:
         """Of 1.5 times the pole pairs, in V·s·A, with a magnet; more_A, more_Vs: along d, that there was not."""
         return _torque(self.psi + psi_f_Vs * self.turned + more_Vs, self.raw.i + more_A)
+
+    def since(self, delay: int) -> "Shown":
+        """Without the first periods, in which there are no pulses along q."""
+        raw = self.raw
+        kept = replace(raw, i=raw.i[delay:], u=raw.u[delay:], theta=raw.theta[delay:], zero=raw.zero[delay:])
+        return Shown(kept, self.psi[delay:], self.turned[delay:])
 
 
 def shown(raw: Raw, losses: Losses) -> Shown:

@@ -7,12 +7,14 @@ the impulses moves the rotor as far as the swing itself, but it is known beforeh
 wave ends at the same sample in spite of the noise and of what is not known of the machine.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
+from fluxtrue_tools.commission.bursts import CLOSER
+from fluxtrue_tools.commission.drive import nothing
 from fluxtrue_tools.commission.rule import Rule
 from fluxtrue_tools.motor.flux_model import Array
 
@@ -21,6 +23,8 @@ PERIODS = 1200  # that are computed; what has not ended by then is not taken
 NOISE = 0.003  # of i_max
 UNCERTAIN = 0.04  # of the voltage, which also stands for the flux linkage
 UNCERTAIN_DRIFT = 0.6  # of the drift before the pulses
+UNCERTAIN_BEYOND = 0.3  # of the slope of the flux linkage beyond the largest current that was shown
+LEAST_BEYOND = 0.3  # of it
 LATE = 0.15  # of the largest change in a period: by so much more may the current be than is computed
 FIRSTS, OTHERS = np.linspace(0.25, 0.9, 20), np.linspace(0.75, 1.0, 6)  # shares of the bound that are tried
 TOPS = (1.0, 0.9, 0.8)  # the same
@@ -50,10 +54,17 @@ class Machine:
     rad_per_torque: float  # electrical angle, in the square of a period
     noise_A: float
     period_s: float
+    offset_A: float = 0.0  # along q, that the sensors show without current
 
-    def current_A(self, psi_Vs: Array) -> Array:
-        """At a flux linkage."""
-        return np.asarray(np.sign(psi_Vs) * np.interp(np.abs(psi_Vs), self.psi_Vs, self.i_A))
+    def current_A(self, psi_Vs: Array, beyond: Array | float = 1.0) -> Array:
+        """At a flux linkage.
+
+        beyond   times its slope over the current, beyond the largest one that was shown
+        """
+        size = np.abs(psi_Vs)
+        (shown_Vs, last_Vs), (shown_A, last_A) = self.psi_Vs[-2:], self.i_A[-2:]
+        more_A = np.maximum(size - shown_Vs, 0.0) * (last_A - shown_A) / ((last_Vs - shown_Vs) * beyond)
+        return np.asarray(np.sign(psi_Vs) * (np.interp(np.minimum(size, shown_Vs), self.psi_Vs, self.i_A) + more_A))
 
     def linkage_Vs(self, i_A: Array) -> Array:
         """The inverse."""
@@ -75,6 +86,7 @@ class Drift:
     i_A: float = 0.0
     speed_rad: float = 0.0  # electrical, in a period
     angle_rad: float = 0.0
+    uncertain_rad: float = 0.0  # of the speed: the rotor stands only about
 
 
 @dataclass(frozen=True)
@@ -93,7 +105,7 @@ class Waves:
 
     def mirrored(self) -> "Waves":
         """To begin in the other direction; equal bounds would begin upwards."""
-        return Waves(-self.high_A * (1.0 + 1e-3), -self.low_A, self.first)
+        return Waves(-self.high_A, -self.low_A if self.high_A > -self.low_A else CLOSER * self.high_A, self.first)
 
 
 @dataclass(frozen=True)
@@ -110,21 +122,24 @@ def course(of: Machine, volts: float, waves: Sequence[Waves], drift: Drift, sign
     rng = np.random.default_rng(0)
     low, high, first = (np.array([getattr(each, name) for each in waves])[:, None] * np.ones((1, DRAWS))
                         for name in ("low_A", "high_A", "first"))  # fmt: skip
-    rule = Rule(low, high, first, REVERSALS)
+    offset = sign * of.offset_A
+    rule = Rule(np.maximum(low + offset, -high - offset), high + offset, first, REVERSALS)  # shown_bounds()
     gain = of.period_s * volts * (1.0 + UNCERTAIN * rng.standard_normal((1, DRAWS)))
     drifts = 1.0 + UNCERTAIN_DRIFT * rng.standard_normal((1, DRAWS))
+    beyond = np.maximum(1.0 + UNCERTAIN_BEYOND * rng.standard_normal((1, DRAWS)), LEAST_BEYOND)
     i, speed, angle = (np.broadcast_to(drifts * value, low.shape)
                        for value in (drift.i_A, drift.speed_rad, drift.angle_rad))  # fmt: skip
+    speed = speed + drift.uncertain_rad * rng.standard_normal((1, DRAWS))
     psi, moved, largest = of.linkage_Vs(i), np.abs(angle), np.abs(i)
     acting = step = np.zeros(low.shape)
     has_ended = np.zeros(low.shape, bool)
     for _ in range(PERIODS):
-        rule.step(sign * i + of.noise_A * rng.standard_normal((1, DRAWS)))
+        rule.step(sign * i + offset + of.noise_A * rng.standard_normal((1, DRAWS)))
         changed = psi + gain * acting - of.period_s * of.lost_V(i)
         returns = (acting == 0.0) | ((acting * psi <= 0.0) & (changed * psi <= 0.0))
         has_ended = has_ended | (rule.ended & returns)
         psi = np.where(has_ended, 0.0, changed)
-        before, i = i, of.current_A(psi)
+        before, i = i, of.current_A(psi, beyond)
         step = np.maximum(step, np.abs(i) - np.abs(before))
         acting = sign * rule.sign
         speed = speed + of.rad_per_torque * of.torque_of(i)
@@ -157,10 +172,14 @@ def _best(moved_rad: Array, reach_A: Array, price: Array, top_A: float) -> int:
     return int(np.argmin(np.where(enough, counts - reach_A / top_A, np.inf)))
 
 
-def quietest(of: Machine, volts: Sequence[float], top_A: float, limit_A: float, drift: Drift
-             ) -> tuple[float, Waves] | None:  # fmt: skip
+def quietest(of: Machine, volts: Sequence[float], top_A: float, limit_A: float, drift: Drift,
+             rest: Callable[[float], None] = nothing) -> tuple[float, Waves] | None:  # fmt: skip
     """One of the voltages, and the bounds: up to top_A, with a current of less than limit_A; None if there are none.
-    The first half wave may go in either direction."""
+    The first half wave may go in either direction.
+
+    rest   lets the drive run for some seconds: called after each voltage and direction, because all of them can take
+           longer than an inverter may be without a sign of life
+    """
     moved, reach, price, made = [], [], [], []
     tried = _tried(top_A)
     for volt, sign in product(volts, (1.0, -1.0)):
@@ -168,6 +187,7 @@ def quietest(of: Machine, volts: Sequence[float], top_A: float, limit_A: float, 
         moved.append(np.where(found.largest_A < limit_A, found.moved_rad, np.inf))
         reach.append(found.reach_A)
         price.append(np.full(len(tried), OF_VOLTAGE * volt / max(volts)))
+        rest(0.0)
         made += [(volt, each if sign > 0.0 else each.mirrored()) for each in tried]
     moved_rad, reach_A, prices = (np.concatenate(parts) for parts in (moved, reach, price))
     return made[_best(moved_rad, reach_A, prices, top_A)] if np.isfinite(moved_rad).any() else None
