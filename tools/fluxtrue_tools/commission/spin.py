@@ -29,7 +29,7 @@ LEVEL_S, WINDOW_S = 0.2, 0.05
 LEVEL_MOST_S = 0.5  # of a level, on a shaft that has not made a turn before
 SHAFT_TURNS = 1.2  # that a level should contain, of a shaft that becomes slower
 SETTLED_SHARE = 1e-3  # of i_max: the mean current of a window is the wanted one
-WINDOWS = 20  # to settle a level
+WINDOWS, TRANSIENT = 20, 4  # to settle a level; after so many of them only the lag behind the voltage is left
 LONGER, LEAST_TURNED = 1.2, 0.2  # electrical turns: of the window after one without a whole turn
 SLOW_HZ, SLOW_SHARE = 20.0, 0.22  # electrical, and of the reached speed: below, the shaft is accelerated again
 NEAR_SHARE = 0.9  # of the reached speed: more than this is no slow shaft
@@ -190,7 +190,7 @@ def _coast(drive: Capture, known: Nameplate, wanted_rad_s: float, top_rad_s: flo
         for level in LEVELS:
             if _is_slow(speed, top_rad_s, known):
                 speed = _last_speed(drive, accelerate(drive, known, again_rad_s, NAME, TURNED, speed))
-            _settle_current(drive, known, level * D_SHARE * known.i_max_A, q_A, speed)
+            q_A = _settle_current(drive, known, level * D_SHARE * known.i_max_A, q_A, speed)
             taken.append(_recorded(drive, known))
             q_A -= mean_current(taken[-1], known.offset_A, known.pole_pairs).imag
             speed = _last_speed(drive, taken[-1])
@@ -200,20 +200,23 @@ def _coast(drive: Capture, known: Nameplate, wanted_rad_s: float, top_rad_s: flo
     return taken
 
 
-def _settle_current(drive: Capture, known: Nameplate, i_d_A: float, q_A: float, speed_rad_s: float) -> None:
+def _settle_current(drive: Capture, known: Nameplate, i_d_A: float, q_A: float, speed_rad_s: float) -> float:
     """Until the mean current is the wanted one, along d, over whole electrical turns, in which the errors of sensors
     and inverter have no mean.
 
     While the machine becomes slower, its voltage falls, and current control follows it by a constant current along q,
-    for which the reference makes up with q_A.
+    for which the reference makes up with q_A. A machine that slows down fast needs more of it: it is returned.
     """
     turning.currents(drive, i_d_A, q_A)
     turn_s = turning.TURN / (known.pole_pairs * abs(speed_rad_s))
-    for _ in range(WINDOWS):
+    for window in range(WINDOWS):
         rows = turning.advance(drive, max(WINDOW_S, turn_s), NAME)
         left_A = i_d_A - mean_current(rows, known.offset_A)
         if abs(left_A) < SETTLED_SHARE * known.i_max_A:
-            return
+            return q_A
+        if window >= TRANSIENT:
+            q_A += left_A.imag
+            turning.currents(drive, i_d_A, q_A)
         turned = abs(float(np.ptp(np.unwrap(rows[:, 4])))) / turning.TURN
         if turned < 1.0:
             turn_s = LONGER * max(WINDOW_S, turn_s) / max(turned, LEAST_TURNED)
