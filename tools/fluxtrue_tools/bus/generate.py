@@ -26,6 +26,18 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.outputs import write_text
 
 PREFIX = "bus"
+EXACT = 2**24  # the largest integers that a float holds
+
+# One copy for all signals: inlined into each of them it took more than a kilobyte of an image.
+COUNT = f"""static inline __attribute__((noinline)) bool {PREFIX}_count(float x, float factor, float low, float high,
+    int32_t *counts)
+{{
+    const bool finite = isfinite(x);
+    const float wanted = finite ? x / factor : 0.0F;
+    *counts = (int32_t)roundf((wanted < low) ? low : (wanted > high) ? high : wanted);
+    return finite;
+}}
+"""
 
 
 def snake(name: str) -> str:
@@ -68,17 +80,17 @@ def put(message: Message, signal: Signal) -> str:
         tests += [f"(x < {int(low)}{suffix}) ? {int(low)}{suffix} : "] if low != 0 or signal.is_signed else []
         return (f"static inline void {struct}_put_{name}{head}{kind} x)\n{{\n"
                 f"    m->{name} = (__typeof__(m->{name}))({''.join(tests)}x);\n}}\n")  # fmt: skip
-    if scale := quantity(signal):
-        return (f"static inline bool {struct}_put_{name}{head}float x, const bus_scales_t *scales)\n{{\n"
-                f"    const float counts = x / scales->{scale};\n"
-                f"    if (!isfinite(x)) {{\n        return false;\n    }}\n"
-                f"    m->{name} = (__typeof__(m->{name}))roundf("
-                f"(counts < {low!r}F) ? {low!r}F : (counts > {high!r}F) ? {high!r}F : counts);\n"
-                f"    return true;\n}}\n")  # fmt: skip
-    return (f"static inline bool {struct}_put_{name}{head}float x)\n{{\n"
-            f"    if (!isfinite(x)) {{\n        return false;\n    }}\n"
-            f"    m->{name} = {struct}_{name}_encode((x < {low!r}F) ? {low!r}F : (x > {high!r}F) ? {high!r}F : x);\n"
-            f"    return true;\n}}\n")  # fmt: skip
+    scale = quantity(signal)
+    scales = ", const bus_scales_t *scales" if scale else ""
+    factor = f"scales->{scale}" if scale else f"{float(signal.scale)!r}F"
+    if signal.offset or max(-low, high) > abs(signal.scale) * EXACT:
+        raise FluxtrueError(f"signal {signal.name}: its counts need an offset or more than {EXACT}")
+    ends = ", ".join(f"{float(round(end / signal.scale))!r}F" for end in (low, high))
+    return (f"static inline bool {struct}_put_{name}{head}float x{scales})\n{{\n"
+            f"    int32_t counts;\n"
+            f"    const bool finite = {PREFIX}_count(x, {factor}, {ends}, &counts);\n"
+            f"    m->{name} = (__typeof__(m->{name}))counts;\n"
+            f"    return finite;\n}}\n")  # fmt: skip
 
 
 def get(message: Message, signal: Signal) -> str:
@@ -145,6 +157,7 @@ def signals_header(sent: list[Message], received: list[Message]) -> str:
     parts.append(phase_constants(sent))
     protected = [message for message in (*sent, *received) if attribute(message, "E2EDataId")]
     parts += [x_macro("BUS_SENT", sent), x_macro("BUS_PROTECTED", protected)]
+    parts.append(COUNT)
     parts += [put(message, signal) for message in sent for signal in message.signals]
     parts += [in_range(message) for message in received]
     parts += [get(message, signal) for message in received for signal in message.signals if quantity(signal)]
