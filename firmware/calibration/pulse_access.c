@@ -71,7 +71,8 @@ void pulse_access_state(const drive_t *drive, uint8_t command, can_frame_t *answ
     if (command == PULSE_STATE) {
         answer->data[1] = (uint8_t)pulsing->phase;
         answer->data[2] = (uint8_t)pulsing->failure;
-        answer->length = 3;
+        answer->data[3] = drive->request.pulses_agreed ? 1U : 0U;
+        answer->length = 4;
     }
     if (command == MOVEMENT_STATE) {
         answer->data[1] = (uint8_t)movement->phase;

@@ -3,8 +3,9 @@
 #define CALIBRATION_PULSE_ACCESS_H
 /** The voltage pulses at standstill over XCP: commands of XCP_USER_CMD beside those of the scope.
  *   PULSE_SET    field (1), value (2, little endian): one value of the next pulses
- *   PULSE_START  starts them once; the drive refuses them unless it runs, stands and has no request (drive/pulsing.c)
- *   PULSE_STATE  answers pulses_phase_t and pulses_failure_t, one byte each
+ *   PULSE_START  starts them once; the drive refuses them without the consent of VCU_Commission, and unless it runs,
+ *                stands and has no request (drive/pulsing.c)
+ *   PULSE_STATE  answers pulses_phase_t, pulses_failure_t and whether there is a consent, one byte each
  *   MOVEMENT_STATE  the same of the movement: movement_phase_t, movement_failure_t (drive/movement.h)
  *   ANGLE_CORRECTION ... +3  answers a coefficient of the correction of the angle sensor, four bytes, little endian:
  *                c_1, s_1, c_2, s_2 (control/adapt/angle_harmonics.h)

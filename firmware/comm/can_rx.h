@@ -36,10 +36,10 @@ typedef struct {
     float drive_kW, regen_kW; /* magnitudes, at the dc terminals */
 } bus_power_limits_t;
 
-/** A movement of the shaft for commissioning, in the raw values of the bus. */
+/** A movement of the shaft and the consent to voltage pulses for commissioning, in the raw values of the bus. */
 typedef struct {
     uint8_t movement, direction, pole_pairs;
-    bool reversed, damped;
+    bool reversed, damped, pulses;
     uint16_t offset;                                /* 2^16 = one electrical turn */
     int16_t current_d_permille, current_q_permille; /* of the largest current */
 } bus_commission_t;

@@ -50,6 +50,7 @@ static bool take_commission(can_rx_t *rx, const can_frame_t *frame)
         .pole_pairs = m.pole_pairs,
         .reversed = m.reversed != 0U,
         .damped = m.damped != 0U,
+        .pulses = m.pulses != 0U,
         .offset = m.offset,
         .current_d_permille = m.current_d,
         .current_q_permille = m.current_q,

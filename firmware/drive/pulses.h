@@ -38,7 +38,8 @@
     X(STOPPED, 2, "Switching has been disabled.") \
     X(MOVED, 3, "The rotor has moved.") \
     X(TIME, 4, "The currents did not reach their bounds in time.") \
-    X(CURRENT, 5, "The current was larger than the largest one of the machine.")
+    X(CURRENT, 5, "The current was larger than the largest one of the machine.") \
+    X(NO_CONSENT, 6, "The bus has not agreed to voltage pulses, or agrees no longer.")
 
 #define PULSES_VALUE(name, value, text) PULSES_##name = (value),
 typedef enum { PULSES_PHASE_LIST(PULSES_VALUE) } pulses_phase_t;

@@ -38,17 +38,22 @@ static uint32_t square_max(q15_t i_max)
     return square + (square >> 4);
 }
 
+static void end(pulsing_t *pulsing, pulses_failure_t failure)
+{
+    pulsing->phase = (failure == PULSES_GOOD) ? PULSES_DONE : PULSES_FAILED;
+    pulsing->failure = failure;
+}
+
 static void start_or_refuse(drive_t *drive, const snapshot_t *snapshot)
 {
     pulsing_t *pulsing = &drive->task.pulsing;
     const pulses_config_t *wanted = &drive->request.pulses.config;
-    pulsing->starts = drive->request.pulses.starts;
-    if (drive_is_pulsing(drive)) {
-        return; /* the pulses continue */
+    if (!drive->request.pulses_agreed) {
+        end(pulsing, PULSES_NO_CONSENT);
+        return;
     }
     if (!may_start(drive, snapshot) || !is_in_range(drive, wanted)) {
-        pulsing->phase = PULSES_FAILED;
-        pulsing->failure = PULSES_REFUSED;
+        end(pulsing, PULSES_REFUSED);
         return;
     }
     const uint16_t number = (uint16_t)(drive->pulses.number + 1U);
@@ -59,27 +64,34 @@ static void start_or_refuse(drive_t *drive, const snapshot_t *snapshot)
     pulsing->failure = PULSES_GOOD;
 }
 
-static void end(pulsing_t *pulsing, pulses_failure_t failure)
+static void continue_or_end(drive_t *drive)
 {
-    pulsing->phase = (failure == PULSES_GOOD) ? PULSES_DONE : PULSES_FAILED;
-    pulsing->failure = failure;
-}
-
-void drive_pulse(drive_t *drive, const snapshot_t *snapshot)
-{
+    pulsing_t *pulsing = &drive->task.pulsing;
     const pulses_state_t *state = &drive->pulses_state;
-    if (drive->request.pulses.starts != drive->task.pulsing.starts) {
-        start_or_refuse(drive, snapshot);
-        return;
-    }
-    if (!drive_is_pulsing(drive)) {
-        return;
-    }
     if (drive->task.run_state != RUN_STATE_RUN || !has_no_request(&drive->request)) {
-        end(&drive->task.pulsing, PULSES_STOPPED);
+        end(pulsing, PULSES_STOPPED);
+        return;
+    }
+    if (!drive->request.pulses_agreed) {
+        end(pulsing, PULSES_NO_CONSENT);
         return;
     }
     if (state->number == drive->pulses.number && !pulses_active(state)) {
-        end(&drive->task.pulsing, state->failure);
+        end(pulsing, state->failure);
+    }
+}
+
+/* A start while pulses run has no effect. It must not delay their end: starts may come in every step. */
+void drive_pulse(drive_t *drive, const snapshot_t *snapshot)
+{
+    pulsing_t *pulsing = &drive->task.pulsing;
+    const bool starts = drive->request.pulses.starts != pulsing->starts;
+    pulsing->starts = drive->request.pulses.starts;
+    if (drive_is_pulsing(drive)) {
+        continue_or_end(drive);
+        return;
+    }
+    if (starts) {
+        start_or_refuse(drive, snapshot);
     }
 }

@@ -130,7 +130,7 @@ static void command_drive(ecu_t *ecu)
     request->limits = limits;
     request->enable = in.run;
     request->fault_resets = ecu->supervisor.resets;
-    request->movement = ecu_movement(ecu);
+    ecu_request_commissioning(ecu);
 }
 
 /* The samples that a step of the second level uses. */

@@ -57,7 +57,8 @@ typedef struct {
     settling_t settling;
     battery_voltage_t battery_voltage;
     dc_jump_state_t dc_jump;
-    uint8_t question; /* of the external watchdog, at the start of the step */
+    uint8_t question;  /* of the external watchdog, at the start of the step */
+    bool pulses_asked; /* the last frame for commissioning agreed to pulses */
     shut_off_t shut_off;
     xcp_access_t xcp;
     freeze_frame_t freeze;

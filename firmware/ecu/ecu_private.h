@@ -23,6 +23,8 @@ torque_limits_t ecu_limits(const ecu_t *ecu);
 void ecu_check_dc_sensor(ecu_t *ecu);
 /* The movement that the bus requests. */
 movement_request_t ecu_movement(const ecu_t *ecu);
+/* Passes the movement on to the drive, and whether the bus agrees to voltage pulses; once per step. */
+void ecu_request_commissioning(ecu_t *ecu);
 /* The part of the telemetry that comes from the bus and the state machine. */
 void ecu_telemetry(const ecu_t *ecu, telemetry_t *telemetry);
 /* Its counters of errors, if a message that contains them may be due. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The movement that the bus requests, in the units of the drive. */
+/* What the bus requests and agrees to for commissioning: a movement, in the units of the drive, and voltage pulses. */
 #include "ecu/ecu_private.h"
 #include "types/si.h"
 
@@ -15,9 +15,7 @@ movement_request_t ecu_movement(const ecu_t *ecu)
     }
     const bus_commission_t *wanted = &ecu->rx.commission;
     const ecu_state_t state = ecu->supervisor.state;
-    const float torque_Nm = ecu->rx.command.torque_requested_Nm;
-    const q15_t torque = q15_from_si(torque_Nm, ecu->drive.motor->bases.torque_Nm);
-    const bool is_zero = fx_abs_q15(torque) <= ecu->arbitration_config.dead_band;
+    const bool is_zero = fx_abs_q15(ecu->commanded.torque_requested) <= ecu->arbitration_config.dead_band;
     return (movement_request_t){
         .movement = wanted->movement,
         .pole_pairs = wanted->pole_pairs,
@@ -29,4 +27,29 @@ movement_request_t ecu_movement(const ecu_t *ecu)
         .offset = wanted->offset,
         .i = {share_of_i_max(ecu, wanted->current_d_permille), share_of_i_max(ecu, wanted->current_q_permille)},
     };
+}
+
+/* Between standby and derate, with the dc link charged or being charged: a consent given in standby lasts up to run. */
+static bool may_last(ecu_state_t state)
+{
+    return state >= STATE_STANDBY && state <= STATE_DERATE;
+}
+
+/* Like a movement, a consent begins only where switching is disabled and no torque is requested. It needs a change of
+ * the signal: after a time-out or a fault a sender that has not noticed it must not agree anew. */
+static bool agrees_to_pulses(ecu_t *ecu, const movement_request_t *movement)
+{
+    const bool asks = ecu->rx.commission.pulses;
+    const bool begins = movement->may_begin && !ecu->pulses_asked;
+    if (movement->alive) {
+        ecu->pulses_asked = asks;
+    }
+    return movement->alive && asks && may_last(ecu->supervisor.state) && (begins || ecu->drive.request.pulses_agreed);
+}
+
+void ecu_request_commissioning(ecu_t *ecu)
+{
+    request_t *request = &ecu->drive.request;
+    request->movement = ecu_movement(ecu);
+    request->pulses_agreed = agrees_to_pulses(ecu, &request->movement);
 }

@@ -205,6 +205,7 @@ const parameter_t parameters[] = {
     {"compensation_knee_A", commissioned_knee_A, NULL, 0, 0},
     {"pulses", pulsed_phase, pulsed_start, 0.0, 1.0},
     {"pulses_failure", pulsed_failure, NULL, 0, 0},
+    {"pulses_agreed", pulsed_agreed, pulsed_agree, 0.0, 1.0},
     {"pulses_vd", pulsed_vd, pulsed_set_vd, 0.0, 0.7},
     {"pulses_vq", pulsed_vq, pulsed_set_vq, 0.0, 0.7},
     {"pulses_first", pulsed_first, pulsed_set_first, 0.0, 1.0},

@@ -77,6 +77,17 @@ double pulsed_failure(const fluxtrue_t *d)
     return (double)d->drive.task.pulsing.failure;
 }
 
+double pulsed_agreed(const fluxtrue_t *d)
+{
+    return d->drive.request.pulses_agreed ? 1.0 : 0.0;
+}
+
+void pulsed_agree(fluxtrue_t *d, double value)
+{
+    const bool may_last = d->drive.request.pulses_agreed || d->drive.task.run_state != RUN_STATE_RUN;
+    d->drive.request.pulses_agreed = value != 0.0 && may_last;
+}
+
 double pulsed_theta_rad(const fluxtrue_t *d)
 {
     const sample_t *sample = sample_box_at(&d->drive.samples, d->drive.samples.generation);

@@ -20,6 +20,9 @@ PULSED_VALUES(PULSED_VALUE)
 double pulsed_phase(const fluxtrue_t *drive);
 void pulsed_start(fluxtrue_t *drive, double value);
 double pulsed_failure(const fluxtrue_t *drive);
+/** The consent to pulses. As on the bus, it begins only with switching disabled. */
+double pulsed_agreed(const fluxtrue_t *drive);
+void pulsed_agree(fluxtrue_t *drive, double value);
 /** Electrical angle of the last sample. */
 double pulsed_theta_rad(const fluxtrue_t *drive);
 

@@ -13,6 +13,7 @@ from bus_stand import COMMAND_ID, COMMISSION_ID, Stand, bus_stand
 
 from fluxtrue_tools.a2l.elf import read
 from fluxtrue_tools.bus.interface import COMMAND, read_interface
+from fluxtrue_tools.bus.protect import Protector
 from fluxtrue_tools.cli import run as command
 from fluxtrue_tools.commission import on_the_bus
 from fluxtrue_tools.commission.bursts import Burst, offset, record
@@ -46,6 +47,8 @@ OFFSETS_ALONG_Q = -0.8985  # of the rotor: the current of the sensors' offsets m
 REFUSED = 1.0
 LOCKED, OUT_OF_RANGE, SYNTAX = 0x25, 0x22, 0x21
 OFF_S = 0.2  # command time-out 30 ms, ramp 15 ms
+TIME_OUT_S = 0.05  # 30 ms after the last frame
+READY_S = 5.0
 
 
 @pytest.fixture
@@ -109,6 +112,98 @@ def test_lost_commands_end_the_pulses_in_the_safe_state(stand: Stand, known: Nam
         record(stand.drive, LONG, known)
     stand.line.pass_time(OFF_S)
     assert stand.drive.get("run_state") == 0.0 and stand.current_A() < 1.0
+
+
+def agreed(stand: Stand) -> bool:
+    return stand.drive._is_agreed_to_pulses()
+
+
+def without_frames(stand: Stand) -> None:
+    stand.clock.kept_back = frozenset({COMMISSION_ID})
+
+
+def with_wrong_crc(stand: Stand) -> None:
+    stand.line._moving_protector = Protector(COMMAND_ID)  # with the data id of none of the messages
+
+
+def with_a_counter_that_stands(stand: Stand) -> None:
+    protector = stand.line._moving_protector
+    counter, protect = protector._counter, protector.protect
+
+    def standing(data: bytes) -> bytes:
+        protector._counter = counter
+        return protect(data)
+
+    protector.protect = standing  # type: ignore[method-assign]
+
+
+def withdrawn(stand: Stand) -> None:
+    stand.line.move(agrees_to_pulses=False)
+
+
+ENDS = [without_frames, with_wrong_crc, with_a_counter_that_stands, withdrawn]
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_pulses_end_with_the_consent_and_the_drive_goes_on(
+    end: Callable[[Stand], None], stand: Stand, known: Nameplate
+) -> None:
+    stand.drive.set("enable", 1.0)
+    during(stand.drive, lambda: end(stand))
+    with pytest.raises(FluxtrueError, match="^commission: voltage pulses without a consent"):
+        record(stand.drive, LONG, known)
+    stand.line.pass_time(OFF_S)
+    assert stand.drive.get("run_state") == 1.0 and stand.drive.get("fault_word") == 0.0
+    assert stand.current_A() < 1.0
+    assert not agreed(stand)
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_a_start_after_the_consent_has_ended_is_refused_with_one_message(
+    end: Callable[[Stand], None], stand: Stand, known: Nameplate
+) -> None:
+    stand.drive.set("enable", 1.0)
+    end(stand)
+    stand.drive.rest(TIME_OUT_S)
+    with pytest.raises(FluxtrueError, match="^commission: voltage pulses without a consent"):
+        record(stand.drive, SMALL, known)
+
+
+def test_a_consent_is_not_given_in_run(stand: Stand, known: Nameplate) -> None:
+    stand.drive.set("enable", 1.0)
+    for is_agreed in (False, True):
+        stand.line.move(agrees_to_pulses=is_agreed)
+        stand.drive.rest(TIME_OUT_S)
+        assert not agreed(stand)
+    with pytest.raises(FluxtrueError, match="^commission: voltage pulses without a consent"):
+        record(stand.drive, SMALL, known)
+    stand.drive.set("enable", 0.0)
+    stand.drive.set("enable", 1.0)
+    assert record(stand.drive, SMALL, known).failure == ""
+
+
+def test_a_consent_that_is_not_accepted_is_one_message(stand: Stand) -> None:
+    without_frames(stand)
+    with pytest.raises(FluxtrueError, match="no consent to voltage pulses .state ready."):
+        stand.drive.set("enable", 1.0)
+
+
+def test_a_consent_beside_a_torque_request_is_refused(stand: Stand) -> None:
+    stand.line.ask(mode="torque", torque_Nm=5.0, limit_Nm=10.0)
+    stand.line.wait_for(("ready",), READY_S, "test")
+    for is_agreed in (False, True):
+        stand.line.move(agrees_to_pulses=is_agreed)
+        stand.line.pass_time(TIME_OUT_S)
+    assert not agreed(stand)
+
+
+def test_a_consent_lasts_without_pulses_and_ends_with_the_dc_link(stand: Stand) -> None:
+    stand.drive.set("enable", 1.0)
+    stand.drive.rest(1.0)
+    assert agreed(stand)
+    stand.line.ask(mode="off", enable=False)
+    stand.line.pass_time(1.0)
+    assert not agreed(stand)
 
 
 def test_a_firmware_without_the_commands_for_pulses_is_refused(

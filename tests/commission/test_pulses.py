@@ -18,7 +18,7 @@ from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
 
 PULSE, DONE, FAILED = 1.0, 3.0, 4.0
-REFUSED, STOPPED, TIME, CURRENT = 1.0, 2.0, 4.0, 5.0
+REFUSED, STOPPED, TIME, CURRENT, NO_CONSENT = 1.0, 2.0, 4.0, 5.0, 6.0
 LONG = Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=1000, periods=2000)
 
 
@@ -46,10 +46,35 @@ def test_a_burst_ends_without_current(drive: SoftwareInTheLoop) -> None:
 def test_without_switching_it_is_refused(drive: SoftwareInTheLoop) -> None:
     drive.set("enable", 0.0)
     drive.capture(SIGNALS, 500)
+    drive.set("pulses_agreed", 1.0)
     LONG.command(drive)
     rows = drive.capture(SIGNALS, 100)
     assert outcome(drive) == (FAILED, REFUSED)
     assert abs(rows[:, 2:4]).max() == 0.0
+
+
+def test_without_a_consent_it_is_refused_with_one_message(drive: SoftwareInTheLoop, known: Nameplate) -> None:
+    drive.set("pulses_agreed", 0.0)
+    LONG.command(drive)
+    rows = drive.capture(SIGNALS, 100)
+    assert outcome(drive) == (FAILED, NO_CONSENT)
+    with pytest.raises(FluxtrueError, match="^commission: voltage pulses without a consent"):
+        record(drive, LONG, known)
+    assert abs(rows[:, 0]).max() < 5.0
+
+
+def test_the_end_of_the_consent_ends_it_and_in_run_there_is_no_new_one(drive: SoftwareInTheLoop) -> None:
+    LONG.command(drive)
+    drive.capture(SIGNALS, 50)
+    assert drive.get("pulses") == PULSE
+    drive.set("pulses_agreed", 0.0)
+    rows = drive.capture(SIGNALS, 200)
+    assert outcome(drive) == (FAILED, NO_CONSENT) and drive.get("run_state") == 1.0
+    assert abs(rows[100:, 0]).max() < 5.0
+    drive.set("pulses_agreed", 1.0)
+    LONG.command(drive)
+    drive.capture(SIGNALS, 50)
+    assert outcome(drive) == (FAILED, NO_CONSENT)
 
 
 @pytest.mark.parametrize("name", ["torque_requested_Nm", "iq_ref_A"])

@@ -23,7 +23,7 @@ class Mover:
         self._protector = Protector(interface.data_id(COMMISSION))
         self.values: dict[str, float | str] = {
             "Movement": "none", "Reversed": 0, "Damped": 0, "CurrentD": 0.0, "CurrentQ": 0.0, "PolePairs": 1,
-            "Direction": "stand", "Offset": 0.0,
+            "Direction": "stand", "Pulses": 0, "Offset": 0.0,
         }  # fmt: skip
 
     def run(self, milliseconds: int, **command: float | str) -> None:

@@ -105,13 +105,17 @@ void test_the_correction_of_the_angle_needs_no_key(void)
     TEST_ASSERT_FALSE(pulse_access_is_command(ANGLE_CORRECTION + ANGLE_HARMONICS));
 }
 
-void test_the_state_is_phase_and_failure(void)
+void test_the_state_is_phase_failure_and_consent(void)
 {
-    can_frame_t answer = {.length = 8};
     drive.task.pulsing.phase = PULSES_FAILED;
     drive.task.pulsing.failure = PULSES_CURRENT;
-    pulse_access_state(&drive, PULSE_STATE, &answer);
-    TEST_ASSERT_EQUAL_UINT8(3, answer.length);
-    TEST_ASSERT_EQUAL_UINT8(PULSES_FAILED, answer.data[1]);
-    TEST_ASSERT_EQUAL_UINT8(PULSES_CURRENT, answer.data[2]);
+    for (uint8_t agreed = 0; agreed <= 1; agreed++) {
+        can_frame_t answer = {.length = 8};
+        drive.request.pulses_agreed = agreed != 0U;
+        pulse_access_state(&drive, PULSE_STATE, &answer);
+        TEST_ASSERT_EQUAL_UINT8(4, answer.length);
+        TEST_ASSERT_EQUAL_UINT8(PULSES_FAILED, answer.data[1]);
+        TEST_ASSERT_EQUAL_UINT8(PULSES_CURRENT, answer.data[2]);
+        TEST_ASSERT_EQUAL_UINT8(agreed, answer.data[3]);
+    }
 }

@@ -288,12 +288,12 @@ static rx_result_t send_limits(uint8_t *count, unsigned drive, unsigned regen)
 }
 
 /* Movement 2, reversed, damped; -400 and 123 of 11 bits from bit 16; 5 pole pairs from bit 38; direction 1 from bit 44;
- * offset 0xBEEF. */
+ * a consent to pulses in bit 46; offset 0xBEEF. */
 static can_frame_t commission_frame(uint8_t *count, int current_d)
 {
     const uint64_t raw = (uint64_t)2 << 12 | (uint64_t)1 << 14 | (uint64_t)1 << 15 |
                          (uint64_t)((unsigned)current_d & 0x7FFU) << 16 | (uint64_t)123 << 27 | (uint64_t)5 << 38 |
-                         (uint64_t)1 << 44 | (uint64_t)0xBEEF << 48;
+                         (uint64_t)1 << 44 | (uint64_t)1 << 46 | (uint64_t)0xBEEF << 48;
     can_frame_t frame = {.id = COMMISSION_ID, .length = 8};
     for (unsigned n = 0; n < 8; n++) {
         frame.data[n] = (uint8_t)(raw >> (8U * n));
@@ -308,12 +308,14 @@ void test_a_movement_has_its_own_channel_and_is_not_alive_when_lost(void)
     can_frame_t frame = commission_frame(&count, -400);
     TEST_ASSERT_EQUAL_INT(RX_SYNCED, can_rx_frame(&rx, &scales, &frame));
     TEST_ASSERT_EQUAL_UINT8(0, rx.commission.movement);
+    TEST_ASSERT_FALSE(rx.commission.pulses);
     frame = commission_frame(&count, -400);
     TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, can_rx_frame(&rx, &scales, &frame));
     TEST_ASSERT_TRUE(rx.commission_channel.alive);
     TEST_ASSERT_EQUAL_UINT8(2, rx.commission.movement);
     TEST_ASSERT_TRUE(rx.commission.reversed);
     TEST_ASSERT_TRUE(rx.commission.damped);
+    TEST_ASSERT_TRUE(rx.commission.pulses);
     TEST_ASSERT_EQUAL_INT16(-400, rx.commission.current_d_permille);
     TEST_ASSERT_EQUAL_INT16(123, rx.commission.current_q_permille);
     TEST_ASSERT_EQUAL_UINT8(5, rx.commission.pole_pairs);

@@ -163,6 +163,7 @@ void test_a_movement_that_ends_at_speed_leaves_the_bridge_off(void)
 void test_pulses_need_a_connection_without_currents(void)
 {
     run();
+    drive.request.pulses_agreed = true;
     drive.request.pulses.config = (pulses_config_t){
         .d = {.v = 1000, .low = -1000, .high = 1000}, .q = {.low = -1, .high = 1}, .reversals = 2, .periods_max = 5};
     drive.request.pulses.starts++;

@@ -12,13 +12,14 @@
 static snapshot_t snapshot;
 static pulses_config_t *const wanted = &drive.request.pulses.config;
 
-/* A drive that runs at standstill without a request, and pulses in the middle of all ranges. */
+/* A drive that runs at standstill without a request, pulses in the middle of all ranges, and the consent to them. */
 void setUp(void)
 {
     const int32_t half = motor.commission.i_max / 2;
     seam_start();
     snapshot = (snapshot_t){.psi_d_error = 0};
     drive.task.run_state = RUN_STATE_RUN;
+    drive.request.pulses_agreed = true;
     *wanted = (pulses_config_t){.d = {.v = 1000, .low = -half, .high = half},
                                 .q = {.v = 1000, .low = -half, .high = half},
                                 .first = 23170,
@@ -131,6 +132,66 @@ void test_in_current_mode_pulses_need_both_requested_currents_to_be_zero(void)
     drive.request.current_mode = true;
     drive.request.i_ref.q = -1;
     refused();
+}
+
+static void ended_with(pulses_failure_t failure)
+{
+    TEST_ASSERT_EQUAL_INT(PULSES_FAILED, drive.task.pulsing.phase);
+    TEST_ASSERT_EQUAL_INT(failure, drive.task.pulsing.failure);
+    TEST_ASSERT_EQUAL_INT(BRIDGE_CONTROL, drive_bridge_mode(&drive, true));
+}
+
+/* Whatever else speaks against the start, the missing consent is the reason. */
+void test_without_a_consent_a_start_is_refused_for_a_reason_of_its_own(void)
+{
+    for (int beside = 0; beside < 2; beside++) {
+        setUp();
+        drive.request.pulses_agreed = false;
+        drive.task.run_state = beside ? RUN_STATE_OFF : RUN_STATE_RUN;
+        ask();
+        ended_with(PULSES_NO_CONSENT);
+        TEST_ASSERT_EQUAL_UINT16(0, drive.pulses.number);
+    }
+}
+
+void test_a_refused_start_is_not_made_up_for_when_the_consent_comes(void)
+{
+    drive.request.pulses_agreed = false;
+    ask();
+    drive.request.pulses_agreed = true;
+    drive_pulse(&drive, &snapshot);
+    ended_with(PULSES_NO_CONSENT);
+}
+
+void test_the_end_of_the_consent_ends_pulses_in_the_same_step(void)
+{
+    ask();
+    drive.request.pulses_agreed = false;
+    drive_pulse(&drive, &snapshot);
+    ended_with(PULSES_NO_CONSENT);
+}
+
+/* A start in every step, as from a tool that repeats its command. */
+void test_further_starts_do_not_delay_the_end_of_pulses(void)
+{
+    for (int by_consent = 0; by_consent < 2; by_consent++) {
+        setUp();
+        ask();
+        drive.request.pulses_agreed = by_consent == 0;
+        drive.task.run_state = by_consent ? RUN_STATE_RUN : RUN_STATE_OFF;
+        ask();
+        ended_with(by_consent ? PULSES_NO_CONSENT : PULSES_STOPPED);
+    }
+}
+
+/* A lost command ends the run and the consent at the same time. */
+void test_with_the_run_the_consent_is_not_the_reason(void)
+{
+    ask();
+    drive.request.pulses_agreed = false;
+    drive.task.run_state = RUN_STATE_OFF;
+    drive_pulse(&drive, &snapshot);
+    ended_with(PULSES_STOPPED);
 }
 
 void test_pulses_that_run_go_on_when_others_are_asked_for(void)

@@ -18,6 +18,9 @@
 #define MODE_TORQUE 0x40U
 #define BATTERY_ID 0x111U
 #define BATTERY_DATA_ID 0x1111U
+#define COMMISSION_ID 0x112U
+#define COMMISSION_DATA_ID 0x1121U
+#define PULSES 0x40U /* in byte 5 */
 #define STATUS_ID 0x210U
 #define DIAG_BUS_ID 0x232U
 #define DIAG_TASK_ID 0x233U
@@ -26,13 +29,13 @@
 #define PER_UNIT_1 65536 /* of q15 in q31 */
 #define COUNT_PER_V (32768.0 / 540.0)
 
-static uint8_t command_counter, battery_counter;
+static uint8_t command_counter, battery_counter, commission_counter;
 
 void setUp(void)
 {
     board_start();
     board.counts.v_dc = (uint16_t)(350.0F / motor.v_dc_full_scale_V * 4096.0F);
-    command_counter = battery_counter = 0;
+    command_counter = battery_counter = commission_counter = 0;
 }
 
 void tearDown(void)
@@ -140,6 +143,75 @@ void test_a_reset_by_the_bus_clears_the_faults_of_the_drive(void)
     command(RESET, 0, 20);
     TEST_ASSERT_EQUAL_HEX32(0, ecu.drive.fast.faults);
     TEST_ASSERT_EQUAL_INT(STATE_STANDBY, ecu.supervisor.state);
+}
+
+typedef enum { INTACT, LOST, WRONG_CRC, WRONG_ID, REPEATED, DAMAGES } damage_t;
+
+static void commission(unsigned pulses, damage_t damage)
+{
+    static can_frame_t last;
+    if (damage != REPEATED) {
+        last = (can_frame_t){.id = COMMISSION_ID, .length = 8, .data = {0, 0, 0, 0, 0, (uint8_t)pulses}};
+        e2e_protect((damage == WRONG_ID) ? COMMAND_DATA_ID : COMMISSION_DATA_ID, &commission_counter, &last);
+    }
+    board.arriving = last;
+    board.arriving.data[0] ^= (damage == WRONG_CRC) ? 1U : 0U;
+    board.waiting = (damage == LOST) ? 0 : 1;
+    tasks(1);
+}
+
+/* Both messages every 10 ms for this time, without a torque request. */
+static void both(unsigned bits, unsigned pulses, damage_t damage, int ms)
+{
+    for (int n = 0; n < ms; n += CYCLE_MS) {
+        command(bits, 0, CYCLE_MS - 1);
+        commission(pulses, damage);
+    }
+}
+
+/* A drive in run with a consent that has been given in ready. */
+static void run_with_consent(void)
+{
+    tasks(100);
+    both(MODE_TORQUE, 0, INTACT, 100);
+    TEST_ASSERT_EQUAL_INT(STATE_READY, ecu.supervisor.state);
+    TEST_ASSERT_FALSE(ecu.drive.request.pulses_agreed);
+    both(MODE_TORQUE, PULSES, INTACT, 10);
+    TEST_ASSERT_TRUE(ecu.drive.request.pulses_agreed);
+    both(MODE_TORQUE | ENABLE, PULSES, INTACT, 200);
+    TEST_ASSERT_EQUAL_INT(STATE_RUN, ecu.supervisor.state);
+    TEST_ASSERT_TRUE(ecu.drive.request.pulses_agreed);
+}
+
+/* One damaged frame or two change nothing. Intact ones do not bring the consent back in run. */
+void test_a_consent_to_pulses_lasts_as_long_as_intact_frames_arrive(void)
+{
+    for (damage_t damage = LOST; damage < DAMAGES; damage++) {
+        run_with_consent();
+        both(MODE_TORQUE | ENABLE, PULSES, damage, 20);
+        TEST_ASSERT_TRUE(ecu.drive.request.pulses_agreed);
+        both(MODE_TORQUE | ENABLE, PULSES, damage, 20);
+        TEST_ASSERT_FALSE(ecu.drive.request.pulses_agreed);
+        both(MODE_TORQUE | ENABLE, PULSES, INTACT, 50);
+        both(MODE_TORQUE | ENABLE, 0, INTACT, 50);
+        both(MODE_TORQUE | ENABLE, PULSES, INTACT, 50);
+        TEST_ASSERT_FALSE(ecu.drive.request.pulses_agreed);
+        TEST_ASSERT_EQUAL_INT(STATE_RUN, ecu.supervisor.state);
+        both(MODE_TORQUE, 0, INTACT, 50);
+        both(MODE_TORQUE, PULSES, INTACT, 50);
+        TEST_ASSERT_TRUE(ecu.drive.request.pulses_agreed);
+    }
+}
+
+void test_without_a_consent_of_the_bus_a_start_over_xcp_is_refused(void)
+{
+    drive_until_enabled();
+    both(MODE_TORQUE | ENABLE, 0, INTACT, 50);
+    both(MODE_TORQUE | ENABLE, PULSES, INTACT, 50); /* too late: not in ready */
+    ecu.drive.request.pulses.starts++;
+    tasks(1);
+    TEST_ASSERT_EQUAL_INT(PULSES_FAILED, ecu.drive.task.pulsing.phase);
+    TEST_ASSERT_EQUAL_INT(PULSES_NO_CONSENT, ecu.drive.task.pulsing.failure);
 }
 
 /* P_b = 324 kW: 32.4 kW and 16.2 kW are a tenth and a twentieth. */

@@ -547,6 +547,21 @@ void test_the_second_level_compares_nothing_while_a_movement_is_agreed(void)
     TEST_ASSERT_EQUAL_HEX32(0, ecu.drive.request.faults);
 }
 
+void test_a_consent_to_pulses_leaves_the_second_level_as_it_is(void)
+{
+    sample_t *sample = &ecu.drive.samples.slot[ecu.drive.samples.generation % SAMPLE_SLOTS];
+    sample->acting = true;
+    ecu.supervisor.state = STATE_READY;
+    ecu_seal_flags(&ecu);
+    ecu.rx.commission = (bus_commission_t){.pulses = true};
+    ecu.rx.commission_channel.alive = true;
+    board.converted = (current_counts_t){2048, 2048 + 650, 2048 - 650};
+    ecu_task_1khz(&ecu);
+    TEST_ASSERT_TRUE(ecu.drive.request.pulses_agreed);
+    TEST_ASSERT_FALSE(movement_is_agreed(&ecu.drive.task.movement));
+    TEST_ASSERT_TRUE(ecu.second_level.mean_q8 != 0);
+}
+
 #define MID_SCALE 2048
 #define D_COUNTS 600 /* 0.29 of full scale against the d axis, 0.32 in the q axis */
 #define Q_COUNTS 560

@@ -837,10 +837,85 @@ void test_a_movement_may_begin_in_standby_and_ready_without_a_torque_request(voi
     for (int state = STATE_INIT; state < STATES; state++) {
         ecu.supervisor.state = (ecu_state_t)state;
         ecu.rx.command.torque_requested_Nm = 0.0F;
+        ecu_convert(&ecu, true);
         TEST_ASSERT_EQUAL(state == STATE_STANDBY || state == STATE_READY, ecu_movement(&ecu).may_begin);
         ecu.rx.command.torque_requested_Nm = -1.0F;
+        ecu_convert(&ecu, true);
         TEST_ASSERT_FALSE(ecu_movement(&ecu).may_begin);
     }
+}
+
+/* One step with this signal of the last frame. */
+static bool agrees(bool asked)
+{
+    ecu.rx.commission.pulses = asked;
+    ecu_request_commissioning(&ecu);
+    return ecu.drive.request.pulses_agreed;
+}
+
+/* A consent in this state, whatever has been before. */
+static void agreed_in(ecu_state_t state)
+{
+    ecu.rx.commission_channel.alive = true;
+    ecu.supervisor.state = state;
+    TEST_ASSERT_FALSE(agrees(false));
+    TEST_ASSERT_TRUE(agrees(true));
+}
+
+void test_a_consent_to_pulses_begins_in_standby_and_ready_without_a_torque_request(void)
+{
+    ecu.rx.commission_channel.alive = true;
+    for (int state = STATE_INIT; state < STATES; state++) {
+        ecu.supervisor.state = (ecu_state_t)state;
+        ecu.rx.command.torque_requested_Nm = 1.0F;
+        ecu_convert(&ecu, true);
+        TEST_ASSERT_FALSE(agrees(false));
+        TEST_ASSERT_FALSE(agrees(true));
+        ecu.rx.command.torque_requested_Nm = 0.0F;
+        ecu_convert(&ecu, true);
+        TEST_ASSERT_FALSE(agrees(true)); /* refused before: it needs a change */
+        TEST_ASSERT_FALSE(agrees(false));
+        TEST_ASSERT_EQUAL(state == STATE_STANDBY || state == STATE_READY, agrees(true));
+    }
+}
+
+/* Between two bursts a torque brakes the rotor. */
+void test_a_consent_to_pulses_lasts_up_to_run_and_derate_and_beside_a_torque_request(void)
+{
+    agreed_in(STATE_STANDBY);
+    ecu.rx.command.torque_requested_Nm = 5.0F;
+    ecu_convert(&ecu, true);
+    for (int state = STATE_STANDBY; state <= STATE_DERATE; state++) {
+        ecu.supervisor.state = (ecu_state_t)state;
+        TEST_ASSERT_TRUE(agrees(true));
+    }
+    TEST_ASSERT_FALSE(agrees(false));
+    TEST_ASSERT_FALSE(agrees(true));
+}
+
+void test_a_state_without_the_dc_link_ends_the_consent_to_pulses_until_a_new_one(void)
+{
+    static const ecu_state_t ends[] = {STATE_INIT, STATE_SAFE_STATE, STATE_FAULT, STATE_DISCHARGE};
+    for (unsigned n = 0; n < sizeof ends / sizeof ends[0]; n++) {
+        agreed_in(STATE_READY);
+        ecu.supervisor.state = ends[n];
+        TEST_ASSERT_FALSE(agrees(true));
+        ecu.supervisor.state = STATE_READY;
+        TEST_ASSERT_FALSE(agrees(true));
+        TEST_ASSERT_FALSE(agrees(false));
+        TEST_ASSERT_TRUE(agrees(true));
+    }
+}
+
+void test_a_time_out_ends_the_consent_to_pulses_until_a_new_one(void)
+{
+    agreed_in(STATE_READY);
+    ecu.rx.commission_channel.alive = false;
+    TEST_ASSERT_FALSE(agrees(true));
+    TEST_ASSERT_FALSE(agrees(false)); /* the last frame's content is of no account */
+    ecu.rx.commission_channel.alive = true;
+    TEST_ASSERT_FALSE(agrees(true));
+    agreed_in(STATE_READY);
 }
 
 void test_the_early_end_of_a_movement_is_seen(void)

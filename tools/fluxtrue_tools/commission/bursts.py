@@ -13,8 +13,9 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
 
 FAILURES = {1: "refused", 2: "switching was disabled", 3: "the rotor moved", 4: "the current did not reach its bound",
-            5: "the current exceeded the machine's largest"}  # fmt: skip
-REFUSED, MOVED, TOO_LARGE = FAILURES[1], FAILURES[3], FAILURES[5]
+            5: "the current exceeded the machine's largest",
+            6: "without a consent: VCU_Commission has not agreed to them, or agrees no longer"}  # fmt: skip
+REFUSED, MOVED, TOO_LARGE, NO_CONSENT = FAILURES[1], FAILURES[3], FAILURES[5], FAILURES[6]
 STARTS = 6  # of one burst
 PUSHES = 20  # short currents against a light rotor, at most
 FOLLOW_S, FOLLOWED = 0.02, 14  # a heavy rotor: time between two changes of the current, and their number at most
@@ -249,7 +250,7 @@ def record(drive: Capture, burst: Burst, known: Nameplate) -> Raw:
         raise FluxtrueError(f"commission: a fault ended the voltage pulses: {', '.join(faults.named(fault))}")
     active = np.nonzero(np.abs(rows[:, 2] + 1j * rows[:, 3]) > 0.0)[0]
     failure = _phase_word(drive)
-    if failure == REFUSED or not len(active):
+    if failure in (REFUSED, NO_CONSENT) or not len(active):
         raise FluxtrueError(f"commission: voltage pulses {failure or 'had no voltage'}")
     running = np.nonzero(rows[:, -1] == PULSE)[0]
     rows = rows[max(running[0] - 1, 0) : running[-1] + 1]

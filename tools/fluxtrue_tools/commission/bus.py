@@ -4,7 +4,7 @@
 Protected commands keep it enabled with a request of zero; only between two bursts a small torque brakes the rotor. The
 values of the voltage pulses are set, and the pulses started, by commands of XCP (firmware/calibration/pulse_access.h),
 and their currents and voltages are captured by the scope. A movement of the shaft is commanded by a protected frame of
-its own; its bounds are in the firmware (firmware/drive/movement.h).
+its own; its bounds are in the firmware (firmware/drive/movement.h). The same frame has the consent to voltage pulses.
 """
 
 import contextlib
@@ -41,7 +41,7 @@ MARGIN_S: Final = 0.015  # captured beside the pulses: the commands to start the
 POLL_S: Final = 0.005
 LATE_S: Final = 0.02  # of the reported speed
 FALL_S: Final = 0.008  # of a torque
-STOPPED: Final = 2.0  # of pulses_failure
+STOPPED, NO_CONSENT = 2.0, 6.0  # of pulses_failure
 TOLD_S: Final = 0.03  # in which the bus says that switching is disabled, and why
 READY_S, RUN_S, OFF_S, RESET_S = 5.0, 0.5, 0.05, 0.05
 LISTEN_S: Final = 0.15
@@ -214,7 +214,7 @@ class OverTheBus:
         self._line.ask(enable=False, torque_Nm=0.0)
         if self._line.movement is None:
             return
-        self._line.move(d_percent=0.0, q_percent=0.0, direction="stand", is_damped=False)
+        self._line.move(d_percent=0.0, q_percent=0.0, direction="stand", is_damped=False, agrees_to_pulses=False)
         self._line.pass_time(OFF_S)
         self._line.move(kind="none")
         self._line.pass_time(RELEASED_S)
@@ -246,20 +246,26 @@ class OverTheBus:
         return self._connection.kind
 
     def _agree(self) -> None:
-        """The consent to a movement, before switching is enabled; none is left of an earlier one."""
-        if self._kind() == "none":
-            return
-        self._line.movement = self._line.movement or Movement()
+        """The consent to a movement or to pulses, before switching is enabled; none is left of an earlier one."""
+        kind, pulses = self._kind(), not self._is_moving
+        self._line.move(agrees_to_pulses=False)
         self._line.pass_time(RELEASED_S)
-        self._line.movement = replace(self._connection, kind=self._kind())
+        self._line.movement = replace(self._connection, kind=kind, agrees_to_pulses=pulses)
         self._line.pass_time(RELEASED_S)
         phase, failure = self._movement_state()
-        if phase != AGREED:
+        if kind != "none" and phase != AGREED:
             raise FluxtrueError(f"commission: the movement has not begun: {MOVEMENT_ENDED.get(failure, 'no answer')}")
+        if pulses and not self._is_agreed_to_pulses():
+            raise FluxtrueError(f"commission: no consent to voltage pulses (state {self._line.state}): no frame with "
+                                "it has arrived, or a torque was requested")  # fmt: skip
 
     def _movement_state(self) -> tuple[float, int]:
         phase, failure, *_ = self._master.command(USER, MOVEMENT_STATE)
         return float(phase), failure
+
+    def _is_agreed_to_pulses(self) -> bool:
+        _phase, _failure, agreed, *_ = self._master.command(USER, PULSE_STATE)
+        return agreed != 0
 
     def shaft_rad_s(self) -> float:
         """The mechanical speed, positive in the electrical direction: the drive reports it with its own pole pairs."""
@@ -297,6 +303,8 @@ class OverTheBus:
         """Disable switching and discharge the dc link."""
         self._enabled = False
         self._line.ask(mode="off", enable=False, torque_Nm=0.0, limit_Nm=0.0)
+        if self._line.movement is not None:
+            self._line.move(agrees_to_pulses=False)
         with contextlib.suppress(FluxtrueError):  # without commands the drive stops by itself
             self.rest(OFF_S)
 
@@ -425,7 +433,7 @@ class OverTheBus:
         self._master.command(USER, PULSE_START)
         phase = self._until_ended()
         most = math.ceil((self._line.now_s - begun_s) / self.period_s)
-        if self._failure == STOPPED:
+        if self._failure in (STOPPED, NO_CONSENT):
             self.rest(TOLD_S)
         with self._fault_first():
             self._scope.until_complete(periods * self.period_s + 1.0)

@@ -48,9 +48,10 @@ class Order:
 
 @dataclass(frozen=True)
 class Movement:
-    """The content of the frame that commands a movement of the shaft."""
+    """The content of the frame that commands a movement of the shaft and agrees to voltage pulses."""
 
     kind: str = "none"
+    agrees_to_pulses: bool = False
     pole_pairs: int = 1
     is_reversed: bool = False
     is_damped: bool = False
@@ -214,6 +215,7 @@ class Line:
                                     "Reversed": int(movement.is_reversed), "Damped": int(movement.is_damped),
                                     "CurrentD": movement.d_percent, "CurrentQ": movement.q_percent,
                                     "PolePairs": movement.pole_pairs, "Direction": movement.direction,
+                                    "Pulses": int(movement.agrees_to_pulses),
                                     "Offset": round(movement.offset_rad / TURN_RAD * OFFSETS) % OFFSETS
                                     * (360.0 / OFFSETS)})  # fmt: skip
         return can.Message(arbitration_id=self._moving.frame_id, is_extended_id=False,

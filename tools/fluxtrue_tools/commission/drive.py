@@ -109,7 +109,9 @@ class SoftwareInTheLoop:
         return name
 
     def set(self, name: str, value: float) -> None:
-        """A value of the drive."""
+        """A value of the drive. The consent to pulses comes before switching is enabled, as over CAN."""
+        if name == "enable":
+            self._loop.set("pulses_agreed", value)
         self._loop.set(self._allowed(name), value)
 
     def get(self, name: str) -> float:
