@@ -10,6 +10,7 @@
 #define V_D_MIN Q15(0.7)                     /* share of the circle that the d axis may always use (CC-11) */
 #define CIRCLE_SHIFT 7                       /* 256 cells of the circle's table */
 #define V_Q_LEAVES_MIN (182 * 128)           /* from here on, q15, the circle's cells leave d less than V_D_MIN */
+#define INSIDE_CIRCLE_Q30 (127 << 23)        /* |v|^2 = 127/128: below, no cell of the circle's table limits v */
 #define REACHED_SHIFT 4                      /* psi_f/16: what is left of a change is made at once (CC-25) */
 
 /* Two halfwords that lie side by side, by one load. */
@@ -169,8 +170,12 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     /* Q25 * Q22 = Q15, below 2^30. */
     const dq_q15_t v = {fx_mulhi(per_v_max_q25, u_q22.d), fx_mulhi(per_v_max_q25, u_q22.q)};
     const fx_pair_t v_pair = fx_pair(fx_sat_q15_word(v.d), fx_sat_q15_word(v.q));
-    if (FX_USUALLY((uint32_t)fx_dot2(v_pair, v_pair) < config->clear_q30)) {
+    const uint32_t squared_q30 = (uint32_t)fx_dot2(v_pair, v_pair);
+    if (FX_USUALLY(squared_q30 < config->clear_q30)) {
         return (current_control_out_t){.u = u, .v = v_pair, .clear = true};
+    }
+    if (squared_q30 < INSIDE_CIRCLE_Q30) { /* the limiter would not change it, but take 40 instructions */
+        return (current_control_out_t){.u = u, .v = v_pair};
     }
     const dq_q15_t limited = limit_to_circle(v, (int32_t)(error << 16), to->turn);
     const dq_q15_t change = {limited.d - v.d, limited.q - v.q};

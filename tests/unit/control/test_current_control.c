@@ -3,6 +3,7 @@
 
 #include "control/current/current_control.h"
 #include "fixture.h"
+#include "fx/circle.h"
 #include "unity.h"
 
 static fixture_t f;
@@ -507,14 +508,14 @@ void test_also_while_the_d_flux_is_to_rise_the_excess_of_the_d_voltage_changes_t
     }
 }
 
-/* |v| between the circle of `clear` and the unit circle, in all directions. */
+/* |v| between the circle of `clear` and where the first cell of the circle's table limits it, in all directions. */
 void test_inside_the_circle_nothing_is_limited_in_either_direction_of_rotation(void)
 {
     uint64_t seed = 55;
     int not_clear = 0;
     for (int n = 0; n < 100000; n++) {
         const double phi = random_in(&seed, 0, 65535) * (2.0 * 3.14159265358979323846 / 65536.0);
-        const double length = random_in(&seed, 880, 985) * 1e-3 * v_max();
+        const double length = random_in(&seed, 880, 995) * 1e-3 * v_max();
         state = (current_control_state_t){(int32_t)(length * cos(phi)) * 32768, (int32_t)(length * sin(phi)) * 32768};
         const current_control_state_t before = state;
         target.turn = (n & 1) ? -1 : 1;
@@ -525,6 +526,21 @@ void test_inside_the_circle_nothing_is_limited_in_either_direction_of_rotation(v
         not_clear += out.clear ? 0 : 1;
     }
     TEST_ASSERT_GREATER_THAN_INT(80000, not_clear);
+}
+
+/* With the d axis first, at the beginning of each of the table's cells, and a q voltage four LSB above what the cell
+ * leaves: the shortest voltages that are limited. None of them may take the shortcut for those inside the circle. */
+void test_every_cell_of_the_circle_limits_a_voltage_just_above_it(void)
+{
+    target.psi.d = (q15_t)(target.psi.d - 1);
+    for (int cell = 0; cell < 256; cell++) {
+        const double d = -(cell * 128 + 2), q = fx_circle_table[cell] + 4;
+        for (int sign = -1; sign <= 1; sign += 2) {
+            state = (current_control_state_t){(int32_t)(d * v_max()), (int32_t)(sign * q * v_max())};
+            (void)step();
+            TEST_ASSERT_TRUE(limited);
+        }
+    }
 }
 
 /* The voltage v in LSB of q15 of the circle's radius, by one integrator alone. */
