@@ -22,6 +22,7 @@ enum {
 };
 
 #define AD2S1210_BITS 24U
+#define AD2S1210_FAULTS 0xFFU /* all of them */
 #define AD2S1210_REGISTER_BITS 8U /* of an address or a register, in configuration mode */
 #define AD2S1210_FAULT_REGISTER 0xFFU
 

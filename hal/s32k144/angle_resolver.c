@@ -11,13 +11,15 @@
 
 #define VELOCITY_TURNS_PER_S (500.0F / 32768.0F) /* of one bit: resolution of 14 bits, 8.192 MHz */
 #define READY_TICKS 85U /* 0.759 us after SAMPLE falls: 6 periods of 8.192 MHz and 20 ns */
-#define MISSING_MAX 3U  /* a restart of the sampling may lose two */
+#define ONE_MISSING (1U << AD2S1210_BITS)
+#define MISSING_MAX (3U * ONE_MISSING) /* a restart of the sampling may lose two */
 #define ANY_WORD 0U     /* sent with each frame: the converter has no data input in normal mode */
 #define FRAME(bits) (LPSPI_TCR_FRAMESZ((bits) - 1U) | LPSPI_TCR_CPHA | LPSPI_TCR_PRESCALE(0))
 
 static const serial_angle_timing_t timing = {.bit = 2, .select = 4, .gap = 5}; /* 14 MHz, 143 ns */
-static ad2s1210_frame_t position;                                              /* of the last frame */
-static uint32_t missing; /* periods in a row without a frame: the last angle is kept */
+/* The last frame, whose angle is kept while frames are missing. Its uppermost byte, which no frame uses, counts these
+ * periods; with the last of them all bits of the fault register are set. The usual period writes and tests one word. */
+static uint32_t position;
 
 /* The converter keeps every fault, including those of its own power-up, until its register has been read in
  * configuration mode between two falling edges of SAMPLE; the second edge comes with the first PWM period. A fault that
@@ -55,13 +57,12 @@ float angle_first_speed(void)
 uint32_t hal_angle_read(void)
 {
     uint32_t frame;
-    if (serial_angle_read(ANY_WORD, &frame) != 0U) {
-        position = ad2s1210_decode(frame);
-        missing = 0;
-    } else {
-        missing++;
+    if (serial_angle_read(ANY_WORD, &frame) == 0U) {
+        frame = position + ONE_MISSING;
+        frame |= (frame >= MISSING_MAX) ? AD2S1210_FAULTS : 0U; /* stays when the count overflows */
     }
-    return (uint32_t)position.value << 16;
+    position = frame;
+    return (uint32_t)ad2s1210_decode(frame).value << 16;
 }
 
 bool hal_angle_is_absolute(void)
@@ -76,5 +77,5 @@ uint32_t angle_follow_index(void)
 
 bool angle_fault(void)
 {
-    return missing >= MISSING_MAX || position.fault != 0U;
+    return ad2s1210_decode(position).fault != 0U;
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/s32k144/serial_angle.h"
 
+#include "fx/codegen.h"
 #include "hal/s32k144/registers.h"
 #include "hal/s32k144/sampling.h"
 #include "hal/s32k144/startup.h"
@@ -10,6 +11,7 @@
 #define PDB0_PULSE 36U
 #define PULSE_TICKS 56U    /* 0.5 us: longer than a clock of the LPSPI, shorter than a frame */
 #define ONE_RECEIVED LPSPI_FSR_RXCOUNT(1U)
+#define ONE_LEFT LPSPI_FSR_TXCOUNT(1U)
 
 void serial_angle_init(const serial_angle_timing_t *timing)
 {
@@ -47,10 +49,16 @@ void serial_angle_start(const serial_angle_t *config)
     sampling_pulse(config->start, config->start + PULSE_TICKS);
 }
 
-/* Each frame that is taken is replaced by a word to send, so that the FIFO stays full. */
+/* Each frame that is taken is replaced by a word to send, so that the FIFO stays full. The usual period has received
+ * one frame and has words left: FSR contains nothing but these two counts, so that one comparison finds it. */
 uint32_t serial_angle_read(uint32_t word, uint32_t *frame)
 {
     const uint32_t state = LPSPI0->FSR;
+    if (FX_USUALLY(state - (ONE_RECEIVED | ONE_LEFT) < LPSPI_FSR_TXCOUNT_MASK)) {
+        *frame = LPSPI0->RDR;
+        LPSPI0->TDR = word;
+        return 1U;
+    }
     const uint32_t received = state & LPSPI_FSR_RXCOUNT_MASK;
     for (uint32_t left = received; left != 0U; left -= ONE_RECEIVED) {
         *frame = LPSPI0->RDR;

@@ -125,6 +125,21 @@ void test_the_third_missing_frame_is_a_fault_and_the_last_angle_stays(void)
     }
 }
 
+/* Longer than the byte in which they are counted. */
+void test_missing_frames_are_a_fault_until_one_comes(void)
+{
+    received(0xABCD00);
+    (void)hal_angle_read();
+    fifos(0, FIFO_WORDS);
+    for (int lost = 1; lost <= 1000; lost++) {
+        TEST_ASSERT_EQUAL_HEX32(0xABCD0000, hal_angle_read());
+        TEST_ASSERT_EQUAL(lost >= 3, angle_fault());
+    }
+    received(0x123400);
+    TEST_ASSERT_EQUAL_HEX32(0x12340000, hal_angle_read());
+    TEST_ASSERT_FALSE(angle_fault());
+}
+
 /* Without a word left to send, the last period may have had none: the newest frame may be old. */
 void test_a_frame_counts_only_while_a_word_is_left_to_send(void)
 {
