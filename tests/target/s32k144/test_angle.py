@@ -78,8 +78,8 @@ Check = Callable[[Parts], None]
 LATE = PlantedError("angle_resolver.c", "#define READY_TICKS 85U", "#define READY_TICKS 180U")
 EARLY = PlantedError("angle_resolver.c", "#define READY_TICKS 85U", "#define READY_TICKS 60U")
 OF_THE_LAST_PERIOD = PlantedError(
-    "angle_resolver.c", "        position = ad2s1210_decode(frame);\n",
-    "        static uint32_t last;\n        position = ad2s1210_decode(last);\n        last = frame;\n",
+    "angle_resolver.c", "    position = frame;\n",
+    "    static uint32_t last;\n    position = last;\n    last = frame;\n    frame = position;\n",
 )  # fmt: skip
 OLDEST_OF_THE_FIFO = PlantedError(
     "serial_angle.c",
