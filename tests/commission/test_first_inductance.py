@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inductances by pulses of a few samples: (CM-46), on recordings that are computed in small steps."""
+"""Inductances by pulses of a few samples: (CM-49), on recordings that are computed in small steps."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inductances by the first pulses, of a few samples each, whose voltage the legs take a large part of: (CM-46)."""
+"""Inductances by the first pulses, of a few samples each, whose voltage the legs take a large part of: (CM-49)."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ TINY_A = 1e-9
 
 
 def legs_in_time(i_s: Array, u_s: Array, level_V: float, knee_A: float) -> Array:
-    """Mean in each period of the vector of three legs that lose 1 V at large currents, (CM-46).
+    """Mean in each period of the vector of three legs that lose 1 V at large currents, (CM-49).
 
     i_s   samples in the stationary frame
     u_s   voltage in the periods between them, with the drive's compensation and without the legs
