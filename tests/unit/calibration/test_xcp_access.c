@@ -346,9 +346,13 @@ void test_the_commands_of_the_voltage_pulses_are_theirs(void)
     connect();
     drive.task.pulsing.failure = PULSES_MOVED;
     TEST_ASSERT_TRUE(send(2, USER_CMD, PULSE_STATE));
-    TEST_ASSERT_EQUAL_UINT8(3, answer.length);
+    TEST_ASSERT_EQUAL_UINT8(4, answer.length);
     TEST_ASSERT_EQUAL_HEX8(0xFF, answer.data[0]);
     TEST_ASSERT_EQUAL_UINT8(PULSES_MOVED, answer.data[2]);
+    TEST_ASSERT_EQUAL_UINT8(0, answer.data[3]);
+    drive.request.pulses_agreed = true;
+    TEST_ASSERT_TRUE(send(2, USER_CMD, PULSE_STATE));
+    TEST_ASSERT_EQUAL_UINT8(1, answer.data[3]);
     drive.task.movement.failure = MOVEMENT_FAILURE_LONG;
     TEST_ASSERT_TRUE(send(2, USER_CMD, MOVEMENT_STATE));
     TEST_ASSERT_EQUAL_UINT8(3, answer.length);
