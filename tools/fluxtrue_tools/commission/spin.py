@@ -29,7 +29,7 @@ LEVEL_S, WINDOW_S = 0.2, 0.05
 LEVEL_MOST_S = 0.5  # of a level, on a shaft that has not made a turn before
 SHAFT_TURNS = 1.2  # that a level should contain, of a shaft that becomes slower
 SETTLED_SHARE = 1e-3  # of i_max: the mean current of a window is the wanted one
-WINDOWS, TRANSIENT = 20, 4  # to settle a level; after so many of them only the lag behind the voltage is left
+WINDOWS = 20  # to settle a level
 LONGER, LEAST_TURNED = 1.2, 0.2  # electrical turns: of the window after one without a whole turn
 SLOW_HZ, SLOW_SHARE = 20.0, 0.22  # electrical, and of the reached speed: below, the shaft is accelerated again
 NEAR_SHARE = 0.9  # of the reached speed: more than this is no slow shaft
@@ -209,14 +209,16 @@ def _settle_current(drive: Capture, known: Nameplate, i_d_A: float, q_A: float, 
     """
     turning.currents(drive, i_d_A, q_A)
     turn_s = turning.TURN / (known.pole_pairs * abs(speed_rad_s))
-    for window in range(WINDOWS):
+    settled_A, before_A = SETTLED_SHARE * known.i_max_A, complex(math.inf, 0.0)
+    for _ in range(WINDOWS):
         rows = turning.advance(drive, max(WINDOW_S, turn_s), NAME)
         left_A = i_d_A - mean_current(rows, known.offset_A)
-        if abs(left_A) < SETTLED_SHARE * known.i_max_A:
+        if abs(left_A) < settled_A:
             return q_A
-        if window >= TRANSIENT:
+        if abs(left_A - before_A) < settled_A:  # it does not change any more
             q_A += left_A.imag
             turning.currents(drive, i_d_A, q_A)
+        before_A = left_A
         turned = abs(float(np.ptp(np.unwrap(rows[:, 4])))) / turning.TURN
         if turned < 1.0:
             turn_s = LONGER * max(WINDOW_S, turn_s) / max(turned, LEAST_TURNED)
