@@ -72,6 +72,7 @@
     X(compensation_knee_A, "A", NUMBER, "Current from which the compensated voltage error is constant.") \
     X(pulses, "", CHOICE, "Phase of the voltage pulses at standstill; 1 starts them.") \
     X(pulses_failure, "", CHOICE, "Reason for which the voltage pulses ended early.") \
+    X(pulses_agreed, "", SWITCH, "Consent to voltage pulses, as of the bus; begins only with switching disabled.") \
     X(pulses_vd, "", NUMBER, "Voltage of the pulses in d, as a share of the largest voltage.") \
     X(pulses_vq, "", NUMBER, "Voltage of the pulses in q, as a share of the largest voltage.") \
     X(pulses_first, "", NUMBER, "Share of its bound at which the first half wave of the current in q ends.") \
