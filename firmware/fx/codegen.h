@@ -9,7 +9,6 @@
  *   FX_LOAD_TWO       angle tracker, state and gains      2
  *                     current control, integrators        1
  *                     current control, anti-windup        1            1
- *                     current control, target             1            1
  *                     window of the identification                     3
  *                     monitor.h: currents, dc voltage                  1 each
  *                     hal/s32k144/angle_quadrature.c                   1

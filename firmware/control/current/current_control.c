@@ -159,11 +159,10 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     const fx_two_words_t integrators = FX_LOAD_TWO(state, s_d_q30, s_q_q30);
     const current_control_state_t s = {integrators.first, integrators.second};
     const fx_pair_t error = fx_pair_sub(pair_of(to->psi.d, to->psi.q), fx_pair(psi.d, psi.q));
-    const fx_two_words_t weighted = FX_LOAD_TWO(to, weighted.d, weighted.q);
     const int32_t turn = to->turn;
     /* |s| <= 1 and |m w psi| <= 1: at most 2^31 - 1. */
-    const dq_q22_t u_q22 = {unlimited_voltage(config->sigma_q24, weighted.first, psi.d, s.s_d_q30 - turn * psi.q),
-                            unlimited_voltage(config->sigma_q24, weighted.second, psi.q, s.s_q_q30 + turn * psi.d)};
+    const dq_q22_t u_q22 = {unlimited_voltage(config->sigma_q24, to->weighted.d, psi.d, s.s_d_q30 - turn * psi.q),
+                            unlimited_voltage(config->sigma_q24, to->weighted.q, psi.q, s.s_q_q30 + turn * psi.d)};
     integrate(state, s, pair_of(to->integral_turn, to->integral_gain), error);
     const dq_q15_t u = {fx_sat_q15_word((u_q22.d + HALF_LSB_Q22) >> 7), fx_sat_q15_word((u_q22.q + HALF_LSB_Q22) >> 7)};
 
@@ -172,11 +171,8 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     const dq_q15_t v = {fx_mulhi(per_v_max_q25, u_q22.d), fx_mulhi(per_v_max_q25, u_q22.q)};
     const fx_pair_t v_pair = fx_pair(fx_sat_q15_word(v.d), fx_sat_q15_word(v.q));
     const uint32_t squared_q30 = (uint32_t)fx_dot2(v_pair, v_pair);
-    if (FX_USUALLY(squared_q30 < config->clear_q30)) {
-        return (current_control_out_t){.u = u, .v = v_pair, .clear = true};
-    }
-    if (squared_q30 < INSIDE_CIRCLE_Q30) { /* the limiter would not change it, but take 40 instructions */
-        return (current_control_out_t){.u = u, .v = v_pair};
+    if (FX_USUALLY(squared_q30 < INSIDE_CIRCLE_Q30)) { /* the limiter would not change it, but take 40 instructions */
+        return (current_control_out_t){.u = u, .v = v_pair, .clear = squared_q30 < config->clear_q30};
     }
     const dq_q15_t limited = limit_to_circle(v, (int32_t)(error << 16), to->turn);
     const dq_q15_t change = {limited.d - v.d, limited.q - v.q};
