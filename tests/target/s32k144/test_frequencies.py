@@ -120,7 +120,7 @@ def _command_before_the_link(folder: Path) -> str:
     return next(part for part in link.partition("-o fluxtrue.elf")[0].split(" && ") if "target fits" in part)
 
 
-SHORTEST = ("encoder", "resolver")  # their fast ISR leaves room for the task at 40 kHz
+SHORTEST = ("encoder", "resolver")  # at 40 kHz their fast ISR leaves enough time for the task
 
 
 @pytest.mark.parametrize("angle", build.FLASHED)
