@@ -2,7 +2,6 @@
 """Rotors with many pole pairs: the same torque over the inertia moves them by more electrical degrees, (CM-28)."""
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.spin import Spun
 from fluxtrue_tools.commission.steps import Found, chosen, run
 from fluxtrue_tools.commission.turning import Connection
-from fluxtrue_tools.motor.flux_model import Array
 from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
 
@@ -24,23 +22,13 @@ MOST_DEG = {("hsm1", 110): 1.3, ("pmasynrm", 112): 1.0, ("hsm1", 120): 1.0}
 EARLIER = ("phases", "spin", "drag")
 
 
-class Timed(Watched):
-    """Adds up the time for which the drive runs."""
-
-    seconds = 0.0
-
-    def capture(self, names: Sequence[str], periods: int) -> Array:
-        self.seconds += periods * self.period_s
-        return super().capture(names, periods)
-
-
-def measured(name: str, seed: int, unknown: Motor, known: Nameplate) -> tuple[Timed, Found, int]:
+def measured(name: str, seed: int, unknown: Motor, known: Nameplate) -> tuple[Watched, Found, int]:
     """The map of a machine whose connection is given, its pole pairs."""
     truth, flux_map, plant = hidden.draw(name, seed, unknown, known.i_max_A, connected=False)
     pairs = round(plant["pole_pairs"])
     connection = Connection(pairs, truth.reversed, truth.offset_rad)
     spun = Spun(connection, truth.psi_f_Vs, 0.0, 0.0, 0.0, 1.0)
-    drive = Timed(Loop(unknown.library, plant, flux_map))
+    drive = Watched(Loop(unknown.library, plant, flux_map))
     earlier = EARLIER, Found(followed=Followed(1.0, pairs, 0.0, connection), spun=spun)
     return drive, run(drive, chosen(("map",)), known, lambda _: None, earlier=earlier), pairs
 

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fluxtrue_tools.commission.drive import PULSE
 from fluxtrue_tools.commission.metered import Metered
 from fluxtrue_tools.motor.flux_model import Array
 from fluxtrue_tools.sim.library import Loop
@@ -23,7 +22,7 @@ class Watched(Metered):
         start_rad_s = self._loop.get("truth.speed_rad_s")
         rows = super().pulse(values)
         if values["pulses_reversals"] > 1.0:
-            angle = np.unwrap(np.concatenate(self.angles_rad))[rows[:, -1] == PULSE]
+            turned = self.turned_rad[-1]
             self.starts_rad_s.append(start_rad_s)
-            self.swings_rad.append(float(np.ptp(angle)) if angle.size else 0.0)
+            self.swings_rad.append(float(np.ptp(turned)) if turned.size else 0.0)
         return rows

@@ -2,6 +2,7 @@
 """Bursts of voltage pulses: commanded, recorded, integrated to flux linkages (CM-9) ... (CM-11)."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -103,6 +104,10 @@ class Raw:
         inductance is another one, and near zero the voltages of the legs are unknown."""
         inside = np.flatnonzero((self.i.real > low_A) & (self.i.real < high_A))
         kept = slice(int(inside[0]), int(inside[-1]) + 1) if len(inside) else slice(0)
+        return self.part(kept)
+
+    def part(self, kept: slice) -> "Raw":
+        """Some of the samples."""
         return replace(self, i=self.i[kept], u=self.u[kept], theta=self.theta[kept], zero=self.zero[kept])
 
     def without(self, offset: complex) -> "Raw":
@@ -277,23 +282,20 @@ class Linkage:
     axes: tuple[float, float]
 
 
+def _three_legs(i_s: Array, of_leg: Callable[[Array], Array]) -> Array:
+    """The vector of what each leg has at its current."""
+    axes = [np.exp(2j * np.pi * k / 3.0) for k in range(3)]
+    return np.asarray(sum(2.0 / 3.0 * axis * of_leg((i_s * np.conj(axis)).real) for axis in axes))
+
+
 def legs_vector(i_s: Array, knee_A: float) -> Array:
     """The vector of three legs whose voltages are sat(i/knee)."""
-    total = np.zeros(len(i_s), complex)
-    for k in range(3):
-        axis = np.exp(2j * np.pi * k / 3.0)
-        total += 2.0 / 3.0 * axis * np.clip((i_s * np.conj(axis)).real / knee_A, -1.0, 1.0)
-    return total
+    return _three_legs(i_s, lambda i: np.clip(i / knee_A, -1.0, 1.0))
 
 
 def legs_of(i_s: Array, knee_A: float) -> Array:
     """The vector of three legs that lose 1 V at large currents; a knee of 0 is that of a constant voltage."""
-    total = np.zeros(i_s.shape, complex)
-    for k in range(3):
-        axis = np.exp(2j * np.pi * k / 3.0)
-        i = (i_s * np.conj(axis)).real
-        total += 2.0 / 3.0 * axis * (leg_share(i, knee_A) if knee_A > 0.0 else np.sign(i))
-    return total
+    return _three_legs(i_s, lambda i: leg_share(i, knee_A) if knee_A > 0.0 else np.sign(i))
 
 
 def mean_sign(begins: Array, ends: Array) -> Array:
@@ -329,12 +331,7 @@ def mean_share(begins: Array, ends: Array, knee_A: float) -> Array:
 
 def of_legs(i_s: Array, knee_A: float) -> Array:
     """The vector of three legs that lose 1 V at large currents: means over each period."""
-    total = np.zeros(len(i_s) - 1, complex)
-    for k in range(3):
-        axis = np.exp(2j * np.pi * k / 3.0)
-        i = (i_s * np.conj(axis)).real
-        total += 2.0 / 3.0 * axis * mean_share(i[:-1], i[1:], knee_A)
-    return total
+    return _three_legs(i_s, lambda i: mean_share(i[:-1], i[1:], knee_A))
 
 
 def _sum(means: Array, period_s: float) -> Array:

@@ -26,8 +26,8 @@ class Metered(SoftwareInTheLoop):
         super().__init__(loop)
         self.seconds, self.square_A2s = 0.0, 0.0
         self.fastest_rad_s, self.largest_A = 0.0, 0.0  # mechanical
-        self.angles_rad: list[Array] = []  # of the shaft, since the start of a burst
-        self.moves_rad: list[float] = []  # of the shaft, from where it stood
+        self._angles_rad: list[Array] | None = None  # of the shaft, while a burst is made
+        self.turned_rad: list[Array] = []  # by the shaft in each burst, from where it stood
         self.of_steps: dict[str, list[float]] = {}  # the same, of each finished step
 
     def capture(self, names: Sequence[str], periods: int) -> Array:
@@ -39,21 +39,28 @@ class Metered(SoftwareInTheLoop):
         self.square_A2s += float(squares.sum()) * self.period_s
         self.largest_A = max(self.largest_A, math.sqrt(float(squares.max(initial=0.0))))
         self.fastest_rad_s = max(self.fastest_rad_s, float(np.abs(speed_rad_s).max(initial=0.0)))
-        self.angles_rad.append(theta_rad)
+        if self._angles_rad is not None:
+            self._angles_rad.append(theta_rad)
         return rows[:, : -len(TRUTH)]
 
     def pulse(self, values: Mapping[str, float]) -> Array:
         """As SoftwareInTheLoop.pulse()."""
-        self.angles_rad = []
+        self._angles_rad = []
         rows = super().pulse(values)
+        angle = np.unwrap(np.concatenate(self._angles_rad))[rows[:, -1] == PULSE]
+        self._angles_rad = None
         if values["pulses_reversals"] > 1.0:
-            angle = np.unwrap(np.concatenate(self.angles_rad))[rows[:, -1] == PULSE]
-            self.moves_rad.append(float(np.abs(angle - angle[0]).max()) if angle.size else 0.0)
+            self.turned_rad.append(angle - angle[:1])
         return rows
+
+    @property
+    def moves_rad(self) -> list[float]:
+        """The largest distance of the shaft from where it stood, of each burst."""
+        return [float(np.abs(turned).max(initial=0.0)) for turned in self.turned_rad]
 
     @contextlib.contextmanager
     def in_step(self, _: Capture, step: Step) -> Iterator[None]:
         """The context of a step for steps.run()."""
-        before = len(self.moves_rad)
+        before = len(self.turned_rad)
         yield
         self.of_steps[step.name] = self.moves_rad[before:]

@@ -2,7 +2,7 @@
 """What a burst along q has shown of the machine, from its own recording: (CM-34), (CM-45)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -41,9 +41,7 @@ class Shown:
 
     def since(self, delay: int) -> "Shown":
         """Without the first periods, in which there are no pulses along q."""
-        raw = self.raw
-        kept = replace(raw, i=raw.i[delay:], u=raw.u[delay:], theta=raw.theta[delay:], zero=raw.zero[delay:])
-        return Shown(kept, self.psi[delay:], self.turned[delay:])
+        return Shown(self.raw.part(slice(delay, None)), self.psi[delay:], self.turned[delay:])
 
 
 def shown(raw: Raw, losses: Losses) -> Shown:
