@@ -456,8 +456,9 @@ void emu_reset(emu_t *emu, uint32_t cause)
     ftfc_reset(emu);
     nvic_reset(emu);
     wdog_restart(emu);
-    uint32_t vector[2] = {0, 0}, zero = 0;
+    uint32_t vector[2] = {0, 0}, zero = 0, thumb = 1U << 24;
     (void)uc_mem_read(emu->uc, 0, vector, sizeof vector);
+    (void)uc_reg_write(emu->uc, UC_ARM_REG_XPSR, &thumb); /* ends an IT block in which the program was stopped */
     (void)uc_reg_write(emu->uc, UC_ARM_REG_IPSR, &zero);
     (void)uc_reg_write(emu->uc, UC_ARM_REG_CONTROL, &zero);
     (void)uc_reg_write(emu->uc, UC_ARM_REG_PRIMASK, &zero);

@@ -88,6 +88,16 @@ def test_ram_that_is_closed_to_keep_its_content_is_open_again_after_a_restored_s
         core.free(start)
 
 
+def test_a_reset_within_an_it_block_ends_the_block(library: ctypes.CDLL, program: Program) -> None:
+    """EPSR.IT is zero after a reset: no instruction of the handler is skipped, wherever the program was stopped."""
+    with Core.of_program(library, program("poke", "-DCASE=33")) as core:
+        for k in range(40):
+            core.run(1e-3 + k * 10e-9)  # an instruction takes 31 ns
+            core.reset(POWER_ON)
+            core.run(1e-3)
+            assert core.error is None, f"stopped {k} times 10 ns later: {core.error}"
+
+
 @pytest.fixture(scope="module")
 def exceptions(program: Program) -> Path:
     return program("exceptions")

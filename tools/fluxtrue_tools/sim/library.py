@@ -163,7 +163,14 @@ class Loop:
             raise LoopError(name, value, OUT_OF_RANGE)
         code = self._library.sim_set(self._sim, name.encode(), value)
         if code != 0:
+            self._raise_if_failed(f"{name} = {value:g}: ")
             raise LoopError(name, value, code)
+
+    def _raise_if_failed(self, before: str) -> None:
+        """Tell why the simulation or the emulation cannot be continued, if it cannot."""
+        failure: bytes | None = self._library.sim_failure(self._sim)
+        if failure is not None:
+            raise FluxtrueError(before + failure.decode(errors="replace"))
 
     def get(self, name: str) -> float:
         """The value now; NaN for an unknown name."""
@@ -208,7 +215,7 @@ class Loop:
         rows = np.empty((capacity, self._width))
         written = self._library.sim_run(self._sim, periods, _pointer(rows), capacity)
         if written == FAILED:
-            raise FluxtrueError(self._library.sim_failure(self._sim).decode(errors="replace"))
+            self._raise_if_failed("")
         if written < 0:
             raise LoopError("run", None, written)
         return rows[:written]

@@ -139,6 +139,12 @@ __attribute__((used)) void reset(void)
     __asm__ volatile("svc #0");
 #elif CASE == 32
     __asm__ volatile("bkpt #0");
+#elif CASE == 33 /* no wrong access: for ever an IT block of which every second instruction is skipped. Unicorn stops
+                    within it because a page of 1 KiB ends there. */
+    __asm__ volatile(
+        "movs r0, #0\n\tmovs r1, #0\n\tmovs r2, #0\n\tmovs r3, #0\n\tb 1f\n\t.balign 1024\n\t.space 1018\n"
+        "1:\tcmp r1, #0\n\titete eq\n\taddeq r0, #1\n\taddne r0, #1\n\taddeq r0, #1\n\taddne r0, #1\n\tb 1b" ::
+            : "r0", "r1", "r2", "r3", "cc");
 #endif
     for (;;) {
     }
