@@ -9,7 +9,7 @@ from pathlib import Path
 
 import image_checks as checks
 import pytest
-from planting import PlantedError, image_with_error
+from planting import PlantedError, assert_passes_without_error, image_with_error
 
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.emulate import build
@@ -115,7 +115,8 @@ def test_the_image_passes_each_check(parts: Parts, check: Callable[[Parts], None
 @pytest.mark.parametrize("name", PLANTED_ERRORS)
 def test_a_planted_error_is_found(parts: Parts, name: str, tmp_path: Path) -> None:
     check, error = PLANTED_ERRORS[name]
-    planted = replace(parts, image=image_with_error(parts.image, error, tmp_path))
+    assert_passes_without_error(check, parts)
+    planted = replace(parts, image=image_with_error(parts.image, [error], tmp_path))
     with pytest.raises((AssertionError, EmulationStoppedError)) as found:
         check(planted)
     places = [entry.name for entry in found.traceback if entry.path == Path(checks.__file__)]

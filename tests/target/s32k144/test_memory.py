@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from flash_saves import Parts
 from listener import Listener
-from planting import FIRMWARE, PORT, PlantedError, relinked, with_error
+from planting import FIRMWARE, PORT, PlantedError, assert_passes_without_error, image_with_error
 
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.bench.image import Stand
@@ -337,7 +337,7 @@ PLANTED_ERRORS: dict[str, Planted] = {
 def test_a_planted_error_is_found(name: str, parts: Parts, tmp_path: Path) -> None:
     planted = PLANTED_ERRORS[name]
     errors = [error for error in (planted.error, planted.also) if error is not None]
-    sources = {old: new for error in errors for old, new in with_error(error, tmp_path).items()}
-    image = relinked(parts.image, sources, tmp_path)
+    assert_passes_without_error(planted.check, parts)
+    image = image_with_error(parts.image, errors, tmp_path)
     with pytest.raises(planted.exception, match=planted.message):
         planted.check(replace(parts, image=image))
