@@ -40,7 +40,7 @@ def test_every_file_of_tests_in_c_is_compiled() -> None:
     assert not _missing(files, [Path(command["file"]) for command in commands])
 
 
-def test_a_file_that_no_test_names_is_found() -> None:
-    known, forgotten = TESTS / "loop" / "test_known.py", TESTS / "loop" / "test_forgotten.py"
-    assert _missing([known, forgotten], [known, TESTS / "hil"]) == [forgotten]
-    assert not _missing([known, forgotten], [TESTS / "loop"])
+def test_a_file_that_is_not_named_is_found() -> None:
+    known, left_out = TESTS / "loop" / "test_known.py", TESTS / "loop" / "test_left_out.py"
+    assert _missing([known, left_out], [known, TESTS / "hil"]) == [left_out]
+    assert not _missing([known, left_out], [TESTS / "loop"])
