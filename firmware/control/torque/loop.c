@@ -4,6 +4,8 @@
 #include "fx/div.h"
 #include "fx/q.h"
 
+#define LIMITED_DECAY_BITS 2 /* at a limit a correction above 0 decays at a quarter of the loop's own rate */
+
 /* Q15 * Q15 = Q30 -> Q31: the integrator keeps every bit of its step. */
 static q31_t product_q31(int32_t a, int32_t b)
 {
@@ -28,21 +30,28 @@ static int32_t relative_error(const torque_loop_config_t *config, const torque_l
     return fx_div_q15(signed_error, fx_max_s32(magnitude, config->torque_min));
 }
 
+/* ki x: what x loses in a step at the loop's own rate. */
+static q31_t decay(const torque_loop_config_t *config, q31_t correction)
+{
+    return fx_mul_q31(fx_q31_from_q15(config->ki), correction);
+}
+
 /* The correction before its authority limits it. magnitude: |T*|. */
 static q31_t integrate(const torque_loop_config_t *config, const torque_loop_in_t *in, q31_t correction,
                        int32_t magnitude, int32_t error)
 {
     if (!in->enabled) {
         /* Decays to zero, so that disabling the loop causes no step of torque (TL-8). */
-        return fx_sub_q31(correction, fx_mul_q31(fx_q31_from_q15(config->ki), correction));
+        return fx_sub_q31(correction, decay(config, correction));
     }
     if (magnitude < config->torque_min >> 1) {
         return correction; /* (TL-5): a small T* would turn an offset of the estimate into a large ratio */
     }
     const int32_t relative = relative_error(config, in, magnitude, error);
     const q31_t moved = fx_add_q31(correction, product_q31(config->ki, relative));
-    /* At a limit the correction must not rise above 0 or above its present value (TL-7). */
-    return in->limited ? fx_min_s32(moved, fx_max_s32(correction, 0)) : moved;
+    /* At a limit a correction above 0 has no effect; kept, it would be too much torque after the limit (TL-7). */
+    const q31_t kept = correction - (decay(config, correction) >> LIMITED_DECAY_BITS);
+    return in->limited ? fx_min_s32(moved, fx_max_s32(kept, 0)) : moved;
 }
 
 q15_t torque_loop_step(const torque_loop_config_t *config, torque_loop_state_t *state, const torque_loop_in_t *in)

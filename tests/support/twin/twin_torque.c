@@ -38,8 +38,9 @@ double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state, con
         /* The relative error is limited to 100 %. */
         const double relative = e * direction / fmax(fabs(in->torque_commanded), motor->torque_min_Nm);
         const double moved = state->correction + motor->torque_ki * twin_clamp(relative, -1.0, 1.0);
-        /* While voltage or reference are limited, the correction may not rise above 0. */
-        const double max = (in->limited && (relative >= 0.0)) ? fmax(state->correction, 0.0) : 1e9;
+        /* While voltage or reference are limited, the correction may not rise above 0, and decays from above 0. */
+        const double kept = state->correction * (1.0 - motor->torque_ki / 4.0);
+        const double max = in->limited ? fmax(kept, 0.0) : 1e9;
         state->correction = fmin(moved, max);
     }
     state->saturated = fabs(state->correction) >= authority;
