@@ -25,8 +25,8 @@ ELSEWHERE = {  # plant fields that a scenario gives in another section, or that 
     "inertia_kgm2", "load_Nm", "viscous_Nms", "seed",
     # The dc link, its contactor and the board's safe state, which an ECU controls: in a scenario the battery is always
     # connected.
-    "dc_link_F", "precharge_s", "discharge_s", "dc_load_ohm", "avalanche_V", "vdc_start_V", "precharge_open",
-    "discharge_open", "contactor_open", "hardware_safe_V",
+    "dc_link_F", "precharge_s", "discharge_s", "dc_load_ohm", "avalanche_V", "vdc_start_V", "vdc_least_V",
+    "precharge_open", "discharge_open", "contactor_open", "hardware_safe_V",
     # A state of the bridge that no drive chose: the reference of the fault campaign.
     "imposed_bridge",
 }  # fmt: skip

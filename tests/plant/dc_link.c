@@ -3,8 +3,6 @@
 
 #include <math.h>
 
-#define V_MIN 1.0
-
 /* dv/dt = rate (v_end - v) */
 static double towards(double v_V, double v_end_V, double rate, double dt_s)
 {
@@ -15,7 +13,7 @@ double dc_link_step(const plant_params_t *p, const plant_switches_t *on, double 
                     double i_bridge_A, double dt_s, double *avalanche_J)
 {
     if (on->contactor && !p->contactor_open) {
-        return fmax(battery_V, V_MIN);
+        return fmax(battery_V, p->vdc_least_V);
     }
     const double pre = on->precharge && !p->precharge_open ? 1.0 / p->precharge_s : 0.0;
     const double dis = on->discharge && !p->discharge_open ? 1.0 / p->discharge_s : 0.0;
@@ -26,5 +24,5 @@ double dc_link_step(const plant_params_t *p, const plant_switches_t *on, double 
         *avalanche_J += 0.5 * p->dc_link_F * (next_V * next_V - p->avalanche_V * p->avalanche_V);
         return p->avalanche_V;
     }
-    return fmax(next_V, V_MIN);
+    return fmax(next_V, p->vdc_least_V);
 }

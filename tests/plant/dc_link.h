@@ -6,7 +6,8 @@
  *   v = V_bat while the contactor is closed;  v <= V_avalanche: above it the semiconductors conduct
  * Source   docs/theory/plant.md (PL-21), (PL-22)
  * Units    V, A, s
- * Range    v >= 1 V, so that the errors of the inverter model, which are shares of v, do not vanish
+ * Range    v >= vdc_least_V, by default 1 V, so that the errors of the inverter model, which are shares of v, do not
+ *          vanish
  * Rounding exact for a bridge current that is constant over the step
  * Context  simulation only; pure */
 #include "plant_params.h"

@@ -24,6 +24,7 @@ void plant_params_default(plant_params_t *params)
     for (int x = 0; x < 3; x++) {
         params->current_gain[x] = 1.0;
     }
+    params->vdc_least_V = 1.0;
     params->vdc_gain = 1.0;
     params->converter_reference = 1.0;
     params->known_voltage_gain = 1.0;
@@ -96,6 +97,9 @@ static const char *bad_sensor(const plant_params_t *p)
     if (!isfinite(p->vdc_gain)) {
         return "vdc_gain";
     }
+    if (!isfinite(p->vdc_offset_V)) {
+        return "vdc_offset_V";
+    }
     if (!above_zero(p->converter_reference)) {
         return "converter_reference";
     }
@@ -124,6 +128,7 @@ static const char *bad_electronics(const plant_params_t *p)
         {"vdc_ripple_V", isfinite(p->vdc_ripple_V) && fabs(p->vdc_ripple_V) < p->vdc_V},
         {"vdc_ripple_hz", not_below_zero(p->vdc_ripple_hz)},
         {"vdc_start_V", not_below_zero(p->vdc_start_V)},
+        {"vdc_least_V", above_zero(p->vdc_least_V)},
         {"dc_link_F", not_below_zero(p->dc_link_F)},
         {"precharge_s", above_zero(p->precharge_s)},
         {"discharge_s", above_zero(p->discharge_s)},

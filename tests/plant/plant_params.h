@@ -28,6 +28,7 @@ typedef struct {
     double pwm_hz, dead_time_s, device_drop_V;
     double leg_knee_A;               /* current at which a leg loses half of its error, (PL-29); 0: (PL-12) */
     double vdc_start_V;              /* of the dc link's capacitor, taken at creation */
+    double vdc_least_V;              /* to which it discharges: the legs' errors are shares of it */
     double dc_link_F;                /* 0: no capacitor, the bridge is always connected to the battery */
     double precharge_s, discharge_s; /* time constants of the capacitor with the resistor of each */
     double dc_load_ohm;              /* resistor across the capacitor, a short circuit near 0; 0: none */
@@ -56,6 +57,7 @@ typedef struct {
     double converter_reference; /* share of the nominal one: everything is read as if it were larger by its inverse */
     double known_voltage_gain;  /* error of the voltage that does not come from the reference */
     double vdc_full_scale_V, vdc_gain;
+    double vdc_offset_V; /* shown without voltage; below 0 the converter shows 0 */
     int vdc_quantise;
     int angle_reversed;                  /* counts against the rotor */
     double angle_offset_rad;             /* electrical */

@@ -53,7 +53,8 @@ static void sample_current(sensors_t *s, const plant_params_t *p, int x, double 
 static void sample_vdc(const plant_params_t *p, double vdc_V, plant_sensors_t *out)
 {
     const double codes = ldexp(1.0, p->adc_bits), step = p->vdc_full_scale_V / codes;
-    const double code = clamp(vdc_V * p->vdc_gain / step / p->converter_reference, 0.0, codes - 1.0);
+    const double shown_V = vdc_V * p->vdc_gain + p->vdc_offset_V;
+    const double code = clamp(shown_V / step / p->converter_reference, 0.0, codes - 1.0);
     const double whole = floor(code + 0.5);
     out->vdc_V = (p->vdc_quantise ? whole : code) * step;
     out->vdc_count = (int32_t)whole;

@@ -105,6 +105,8 @@ void test_impossible_electronics_are_refused_by_name(void)
     REFUSE(current_noise_A_rms, -0.5);
     REFUSE(vdc_full_scale_V, 0.0);
     REFUSE(vdc_gain, nan);
+    REFUSE(vdc_offset_V, nan);
+    REFUSE(vdc_least_V, 0.0);
     REFUSE(converter_reference, 0.0);
     REFUSE(known_voltage_gain, -1.0);
     REFUSE(angle_offset_rad, nan);

@@ -190,6 +190,22 @@ void test_the_dc_voltage_is_quantised_and_limited_to_full_scale(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 398.0, seen.vdc_V);
 }
 
+/* An offset is shown without voltage, too; the converter has nothing below 0. */
+void test_an_offset_of_the_dc_voltage_is_shown_at_every_voltage(void)
+{
+    p.vdc_offset_V = 2.5;
+    start();
+    plant_sample(plant, &seen);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 402.5, seen.vdc_V);
+    plant_params(plant)->vdc_V = 1.0;
+    plant_sample(plant, &seen);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 3.5, seen.vdc_V);
+    plant_params(plant)->vdc_offset_V = -2.5;
+    plant_sample(plant, &seen);
+    TEST_ASSERT_DOUBLE_WITHIN(0.0, 0.0, seen.vdc_V);
+    TEST_ASSERT_EQUAL(0, seen.vdc_count);
+}
+
 /* Everything but the zero of the currents moves with the reference, and so does what is read of a known voltage. */
 void test_a_reference_that_is_too_small_makes_all_readings_larger(void)
 {

@@ -192,6 +192,7 @@ class Plant(Strict):
     known_voltage_gain: AnyNumber | None = None
     vdc_full_scale_V: AnyPositive | None = None
     vdc_gain: AnyNumber | None = None
+    vdc_offset_V: AnyNumber | None = None
     vdc_quantise: bool | None = None
     phases_swapped: bool | None = None
     angle_reversed: bool | None = None
