@@ -13,6 +13,11 @@ void before_reset(const drive_t *drive, before_reset_t *before)
     };
 }
 
+q15_t after_reset_v_dc(const motor_t *m, uint32_t count)
+{
+    return (q15_t)measure_v_dc(&m->measure.v_dc, count);
+}
+
 /* (SS-14). A rotor does not lose half of its speed during a reset, but a broken sensor may read a standstill. */
 static q15_t present_speed(const before_reset_t *before, q15_t speed)
 {

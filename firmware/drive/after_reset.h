@@ -4,6 +4,7 @@
 /** The safe state through a reset of the processor: what a port keeps over it, and how the drive continues.
  *   before_reset()  in each step of the task, for memory that outlasts a reset
  *   after_reset_needs_short_circuit()  before anything else after one, with what is measured then
+ *   after_reset_v_dc()  what a port measures then, without the offset of its sensor
  *   after_reset_hold()  after drive_init(): the drive holds the short circuit that the port has applied, until the
  *     speed allows disabled switching, as after a fault
  * Source   docs/theory/safe-state.md, section 6
@@ -23,6 +24,9 @@ typedef struct {
 } before_reset_t;
 
 void before_reset(const drive_t *drive, before_reset_t *before);
+
+/** The dc voltage of a converter's count, as each sample of the fast interrupt has it. */
+q15_t after_reset_v_dc(const motor_t *m, uint32_t count);
 
 /** speed: magnitude measured now, negative if it cannot be. If it is less than half of the last known one, or its
  * sensor had failed, the last known one counts (SS-14). */

@@ -27,8 +27,7 @@ static q15_t measured_speed(void)
 static q15_t measured_v_dc(void)
 {
     sampling_first_end();
-    const float share = (float)sampling_first_v_dc() / (float)(1U << motor.adc_bits);
-    return q15_from_si(share * motor.v_dc_full_scale_V, motor.bases.voltage_V);
+    return after_reset_v_dc(&motor, sampling_first_v_dc());
 }
 
 /* A dc link that has lost an eighth of its voltage was without its battery for longer than a contactor takes to open:

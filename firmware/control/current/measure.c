@@ -8,25 +8,19 @@
 #define ROOT_THREE_Q19 908094
 #define QUARTER_LSB_Q28 2048 /* of q15 */
 
-/* Unsigned arithmetic: a count beyond the converter's width wraps instead of being undefined. */
-static int32_t line(const measure_line_t *line, uint32_t count)
-{
-    return (int32_t)(count * (uint32_t)line->scale + (uint32_t)line->bias);
-}
-
 measure_t measure_step(const measure_config_t *config, const adc_counts_t *counts)
 {
     /* A third of each phase in Q28 is below 4/3, so that 2a + b + c fits; only a count beyond the converter's width
      * wraps. */
-    const int32_t a = line(&config->phase[0], counts->i_a);
-    const int32_t minus_b = line(&config->phase[1], counts->i_b);
-    const int32_t minus_c = line(&config->phase[2], counts->i_c);
+    const int32_t a = measure_line(&config->phase[0], counts->i_a);
+    const int32_t minus_b = measure_line(&config->phase[1], counts->i_b);
+    const int32_t minus_c = measure_line(&config->phase[2], counts->i_c);
     const int32_t minus_others = fx_add_wrap(minus_b, minus_c);
     return (measure_t){
         .i = {fx_sat_q15_word((int32_t)((uint32_t)minus_others + 2U * (uint32_t)a) >> 13),
               fx_sat_q15_word(fx_mulhi(fx_sub_wrap(minus_c, minus_b), ROOT_THREE_Q19))}, /* Q28 * Q19 = Q15 */
         .zero_q28 = fx_sub_wrap(a, minus_others),
-        .v_dc = fx_usat_q15_word(line(&config->v_dc, counts->v_dc) >> 15),
+        .v_dc = measure_v_dc(&config->v_dc, counts->v_dc),
     };
 }
 

@@ -9,7 +9,7 @@ typedef struct {
     int pole_pairs, periods_per_step;
     double r_ohm_20, psi_f_Vs, period_s, step_s; /* PWM period; step of the 1 kHz task */
     double i_base_A, v_base_V, omega_base_rad_s; /* only to state per-unit results */
-    double current_full_scale_A, v_dc_full_scale_V;
+    double current_full_scale_A, v_dc_full_scale_V, v_dc_offset_V;
     int adc_bits;
     /* angle tracker */
     double tracker_bandwidth_rad_s;

@@ -10,7 +10,8 @@ twin_measure_t twin_measure(const motor_si_t *motor, const twin_measure_config_t
     for (int x = 0; x < 3; x++) {
         i[x] = (counts[x] - config->offset[x]) / (0.5 * full) * config->gain[x] * motor->current_full_scale_A;
     }
-    return (twin_measure_t){{i[0], i[1], i[2]}, counts[3] / full * config->v_dc_gain * motor->v_dc_full_scale_V};
+    const double v_dc = counts[3] / full * config->v_dc_gain * motor->v_dc_full_scale_V - motor->v_dc_offset_V;
+    return (twin_measure_t){{i[0], i[1], i[2]}, v_dc};
 }
 
 twin_angle_t twin_angle_tracker(const motor_si_t *motor, twin_angle_state_t *state, double theta_m_rad)

@@ -69,6 +69,10 @@ BAD = [
     ({"inverter": {"min_pulse_s": 15e-6}}, ["inverter.min_pulse_s = 1.5e-05", "10 % of the PWM period"]),
     ({"inverter": {"v_dc_full_scale_V": 400.0}}, ["inverter.v_dc_full_scale_V = 400", "455"]),
     ({"inverter": {"v_dc_full_scale_V": 3000.0}}, ["v_dc_full_scale_V"]),
+    ({"inverter": {"v_dc_offset_V": 27.0}}, ["inverter.v_dc_offset_V = 27 V", "-26.25 to 26.25 V", "5 %"]),
+    ({"inverter": {"v_dc_offset_V": -27.0}}, ["inverter.v_dc_offset_V = -27 V", "-26.25 to 26.25 V"]),
+    ({"inverter": {"v_dc_offset_V": 300.0}}, ["inverter.v_dc_offset_V = 300", "-200 to 200"]),
+    ({"inverter": {"v_dc_offset_V": 10.0, "v_dc_full_scale_V": 460.0}}, ["v_dc_offset_V = 10 V", "up to 5 V"]),
     ({"inverter": {"device_drop_V": 9.0}, "machine": {}}, None),  # 9 V of 350 V: allowed
     ({"machine": {"ld_H": 0.0}}, ["machine.ld_H = 0.0", "above 0 up to 1"]),
     ({"inverter": {"min_pulse_s": -1.0}}, ["inverter.min_pulse_s = -1.0", "from 0 to 2e-05"]),

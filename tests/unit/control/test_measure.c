@@ -11,6 +11,7 @@ static struct {
     int shift; /* 16 - adc_bits */
     int32_t offset[3], gain_q14[3];
     uint32_t v_dc_gain_q15;
+    int32_t v_dc_offset_q15; /* of V_b */
 } config;
 
 /* A converter of 12 bits, whose counts are shifted left by 4; its mid-scale is 2048 counts. */
@@ -18,6 +19,7 @@ void setUp(void)
 {
     config.shift = 4;
     config.v_dc_gain_q15 = 32768;
+    config.v_dc_offset_q15 = 0;
     for (int x = 0; x < 3; x++) {
         config.offset[x] = 32768;
         config.gain_q14[x] = 16386; /* 1.0001, a multiple of 6: Q13 represents a third of it exactly */
@@ -26,7 +28,8 @@ void setUp(void)
 
 static measure_config_t configured(void)
 {
-    measure_config_t c = {.v_dc = {(int32_t)(config.v_dc_gain_q15 << config.shift) / 2, 0x4000}};
+    measure_config_t c = {
+        .v_dc = {(int32_t)(config.v_dc_gain_q15 << config.shift) / 2, 0x4000 - config.v_dc_offset_q15 * 32768}};
     for (int x = 0; x < 3; x++) {
         const int32_t third = (x == 0) ? config.gain_q14[x] / 6 : -config.gain_q14[x] / 6; /* Q13 */
         c.phase[x].scale = third * (1 << config.shift);
@@ -90,6 +93,28 @@ void test_the_dc_voltage_scales_with_its_gain(void)
     TEST_ASSERT_EQUAL_INT(32767, measured(&full).v_dc); /* 1.9995 V_b saturates */
 }
 
+/* Below the offset the voltage is 0 and not negative; the gain does not scale the offset, which is in units of V_b. */
+void test_the_offset_of_the_dc_voltage_is_subtracted_once(void)
+{
+    config.v_dc_offset_q15 = 320; /* 80 counts */
+    config.v_dc_gain_q15 = 16384;
+    const struct {
+        uint16_t count;
+        int32_t v_dc;
+    } cases[] = {{0, 0}, {79, 0}, {80, 0}, {81, 4}, {160, 320}, {2048, 8192 - 320}};
+    for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        const adc_counts_t counts = {2048, 2048, 2048, cases[n].count};
+        const measure_config_t c = configured();
+        TEST_ASSERT_EQUAL_INT(cases[n].v_dc, measured(&counts).v_dc);
+        TEST_ASSERT_EQUAL_INT(measured(&counts).v_dc, measure_v_dc(&c.v_dc, cases[n].count));
+    }
+    config.v_dc_offset_q15 = -320;
+    const adc_counts_t none = {2048, 2048, 2048, 0}, most = {2048, 2048, 2048, 4095};
+    TEST_ASSERT_EQUAL_INT(320, measured(&none).v_dc);
+    config.v_dc_gain_q15 = 32768;
+    TEST_ASSERT_EQUAL_INT(32767, measured(&most).v_dc); /* 32760 + 320 saturates */
+}
+
 void test_an_offset_and_a_gain_belong_to_their_own_phase(void)
 {
     config.offset[1] = 32768 + 160;
@@ -103,7 +128,10 @@ void test_an_offset_and_a_gain_belong_to_their_own_phase(void)
 
 static void compare_with_twin(worst_t *worst, int bits, const adc_counts_t *c)
 {
-    motor_si_t si = {.adc_bits = bits, .current_full_scale_A = 32768.0, .v_dc_full_scale_V = 32768.0};
+    motor_si_t si = {.adc_bits = bits,
+                     .current_full_scale_A = 32768.0,
+                     .v_dc_full_scale_V = 32768.0,
+                     .v_dc_offset_V = config.v_dc_offset_q15};
     const double lsb = 1 << config.shift;
     const twin_measure_config_t twin_config = {
         {config.offset[0] / lsb, config.offset[1] / lsb, config.offset[2] / lsb},
@@ -140,7 +168,8 @@ void test_every_count_with_random_offsets_and_gains_follows_the_twin(void)
                 config.offset[x] = random_in(&seed, 0, 65535);
                 config.gain_q14[x] = 6 * random_in(&seed, 1, 5461);
             }
-            config.v_dc_gain_q15 = 2U * (uint32_t)random_in(&seed, 1, 32767);
+            config.v_dc_gain_q15 = 2U * (uint32_t)random_in(&seed, 1, 32000);
+            config.v_dc_offset_q15 = random_in(&seed, -1500, 1500); /* with the gain below 2 V_b */
             const uint16_t c = (uint16_t)count;
             const uint16_t other = (uint16_t)random_in(&seed, 0, (1 << bits) - 1);
             compare_with_twin(&worst, bits, &(adc_counts_t){c, c, c, c});

@@ -34,6 +34,17 @@ void tearDown(void)
 {
 }
 
+/* The count that the seam has for 350 V; less an offset of 20 V, and not below 0. */
+void test_the_voltage_after_a_reset_is_that_of_a_sample(void)
+{
+    const uint32_t count = (uint32_t)(350.0F / motor.v_dc_full_scale_V * (float)(1U << motor.adc_bits) + 0.5F);
+    TEST_ASSERT_INT_WITHIN(8, volts(350.0F), after_reset_v_dc(&motor, count));
+    motor_t with_offset = motor;
+    with_offset.measure.v_dc.bias -= (int32_t)(20.0F / motor.bases.voltage_V * 1073741824.0F);
+    TEST_ASSERT_INT_WITHIN(8, volts(330.0F), after_reset_v_dc(&with_offset, count));
+    TEST_ASSERT_EQUAL_INT(0, after_reset_v_dc(&with_offset, 0));
+}
+
 void test_the_present_speed_decides_by_the_lower_level(void)
 {
     TEST_ASSERT_TRUE(needs(9500.0F, 350.0F));

@@ -61,6 +61,7 @@ void test_measurement_and_angle_are_the_si_values(void)
     const double wn = motor_si.tracker_bandwidth_rad_s * motor_si.period_s;
     const double lsb = 65536.0 / (1 << motor_si.adc_bits); /* of the converter, in 16-bit counts */
     HELD(motor_si.v_dc_full_scale_V / v_b, motor.measure.v_dc.scale / lsb / 16384.0, 1.0 / lsb / 16384.0);
+    HELD(-motor_si.v_dc_offset_V / v_b, (motor.measure.v_dc.bias - 16384) / 1073741824.0, 1.0 / 1073741824.0);
     for (int phase = 0; phase < 3; phase++) {
         const int sign = (phase == 0) ? 1 : -1; /* b and c are negated; the bias of a is half an LSB of alpha */
         HELD(sign * lsb * 8192.0 / 3.0, motor.measure.phase[phase].scale, 1.0);

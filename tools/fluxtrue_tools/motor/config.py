@@ -17,6 +17,8 @@ TRIP_PER_FULL_SCALE = 0.78  # documented in bring-your-motor.md: below 80 % of t
 FULL_SCALE_PER_I_MAX = 1.35  # leaves 5 % between i_max and the trip for noise and overshoot
 SLEW_PER_TORQUE_MAX = 100.0  # 1/s
 THERMAL_SPAN_MIN_K = 5.0
+DC_OFFSET_SHARE_MAX = 0.05  # of the full scale
+DC_RANGE_SHARE = 1.3  # of vdc_V: the over-voltage trip lies below it
 ANGLE_PER_PERIOD_MAX = 1.2  # rad: five samples per turn of the field; beyond it the formats of angle and speed end
 ANGLE_TURNING = 0.35  # rad: from here on current_control_turning.c; below, either law keeps 40 degrees
 
@@ -51,6 +53,7 @@ class Inverter(Strict):
     device_drop_V: Annotated[float, Field(ge=0, le=10)] = 0.0
     min_pulse_s: Annotated[float, Field(ge=0, le=2e-5)] | None = None
     v_dc_full_scale_V: Annotated[float, Field(gt=0, le=4000)] | None = None
+    v_dc_offset_V: Annotated[float, Field(ge=-200, le=200)] = 0.0  # shown without voltage
 
 
 class Control(Strict):
@@ -121,6 +124,12 @@ class MotorConfig(Strict):
     def v_dc_full_scale_V(self) -> float:
         given = self.inverter.v_dc_full_scale_V
         return 1.5 * self.inverter.vdc_V if given is None else given
+
+    @property
+    def v_dc_offset_max_V(self) -> float:
+        """The largest voltage that the converter can show, the full scale less the offset, lies above the trip."""
+        full_scale_V = self.v_dc_full_scale_V
+        return min(DC_OFFSET_SHARE_MAX * full_scale_V, full_scale_V - DC_RANGE_SHARE * self.inverter.vdc_V)
 
     @property
     def torque_slew_Nm_per_s(self) -> float:
@@ -199,17 +208,34 @@ def _check_currents(config: MotorConfig) -> None:
         )
 
 
+def _check_dc_offset(config: MotorConfig) -> None:
+    offset_V, full_scale_V = config.inverter.v_dc_offset_V, config.v_dc_full_scale_V
+    limit_V = DC_OFFSET_SHARE_MAX * full_scale_V
+    if abs(offset_V) > limit_V:
+        _fail(
+            f"inverter.v_dc_offset_V = {offset_V:g} V, allowed: from {-limit_V:g} to {limit_V:g} V "
+            f"({100 * DC_OFFSET_SHARE_MAX:g} % of v_dc_full_scale_V = {full_scale_V:g} V)"
+        )
+    if offset_V > config.v_dc_offset_max_V:
+        _fail(
+            f"inverter.v_dc_offset_V = {offset_V:g} V, allowed: up to {strict.down(config.v_dc_offset_max_V):g} V "
+            f"(v_dc_full_scale_V = {full_scale_V:g} V less {DC_RANGE_SHARE:g} * vdc_V: the over-voltage trip lies "
+            "below the largest voltage that is seen)"
+        )
+
+
 def _check_inverter(config: MotorConfig) -> None:
     inverter = config.inverter
     for key, value in (("dead_time_s", inverter.dead_time_s), ("min_pulse_s", config.min_pulse_s)):
         limit = 0.1 / inverter.pwm_hz
         if value > limit:
             _fail(f"inverter.{key} = {value:g} s, allowed: up to {limit:g} s (10 % of the PWM period)")
-    if config.v_dc_full_scale_V < 1.3 * inverter.vdc_V:
+    if config.v_dc_full_scale_V < DC_RANGE_SHARE * inverter.vdc_V:
         _fail(
             f"inverter.v_dc_full_scale_V = {config.v_dc_full_scale_V:g} V, allowed: from "
-            f"{1.3 * inverter.vdc_V:g} V (1.3 * vdc_V: the over-voltage trip lies below it)"
+            f"{DC_RANGE_SHARE * inverter.vdc_V:g} V ({DC_RANGE_SHARE:g} * vdc_V: the over-voltage trip lies below it)"
         )
+    _check_dc_offset(config)
     if inverter.device_drop_V > 0.05 * inverter.vdc_V:
         _fail(
             f"inverter.device_drop_V = {inverter.device_drop_V:g} V, allowed: up to "

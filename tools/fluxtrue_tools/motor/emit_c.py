@@ -119,6 +119,21 @@ def _bases(bases: Bases) -> list[Row]:
     return [(name, f"{v}u" if isinstance(v, int) else _float(v), "") for name, v in values.items()]
 
 
+def _dc_bias(motor: Motor, gain: int) -> int:
+    """The offset of the dc voltage's sensor in Q30, and half an LSB of q15: (CC-3)."""
+    offset_V = motor.config.inverter.v_dc_offset_V
+    bias = 16384 - round(math.ldexp(offset_V / motor.bases.voltage_V, 30))
+    if gain * (2**motor.config.inverter.adc_bits - 1) + bias > INT32_MAX:
+        raise Unfit("v_dc_full_scale_V - v_dc_offset_V, allowed: below twice V_b")
+    return bias
+
+
+def _dc_comment(motor: Motor, shift: int) -> str:
+    full_scale = f"{motor.config.v_dc_full_scale_V:g} V full scale in Q14, times 2^{shift}"
+    offset_V = motor.config.inverter.v_dc_offset_V
+    return f"{full_scale}; {offset_V:g} V of offset" if offset_V else full_scale
+
+
 def _measure(motor: Motor) -> list[Row]:
     shift = 16 - motor.config.inverter.adc_bits
     ratio = motor.config.v_dc_full_scale_V / motor.bases.voltage_V
@@ -134,7 +149,7 @@ def _measure(motor: Motor) -> list[Row]:
             "{" + ", ".join(f"{{{s}, {b}}}" for s, b in phases) + "}",
             f"a third of gain 1.0 in Q13, times 2^{shift}; -32768 counts of it",
         ),
-        ("v_dc", f"{{{gain}, 16384}}", f"{motor.config.v_dc_full_scale_V:g} V full scale in Q14, times 2^{shift}"),
+        ("v_dc", f"{{{gain}, {_dc_bias(motor, gain)}}}", _dc_comment(motor, shift)),
     ]
 
 
@@ -787,6 +802,7 @@ def _si_rows(motor: Motor) -> list[Row]:
         "omega_base_rad_s": b.omega_rad_s,
         "current_full_scale_A": inverter.current_full_scale_A,
         "v_dc_full_scale_V": motor.config.v_dc_full_scale_V,
+        "v_dc_offset_V": inverter.v_dc_offset_V,
         "id0_A": tables.id_A[0],
         "did_A": tables.id_A[1] - tables.id_A[0],
         "diq_A": tables.iq_A[1],

@@ -52,6 +52,7 @@ def plant_parameters(machine: dict[str, Any], inverter: dict[str, Any]) -> dict[
         "adc_bits": inverter["adc_bits"],
         "current_quantise": 1.0,
         "vdc_full_scale_V": inverter["v_dc_full_scale_V"],
+        "vdc_offset_V": inverter["v_dc_offset_V"],
     }
 
 
