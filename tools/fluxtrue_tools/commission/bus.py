@@ -34,7 +34,9 @@ FIELDS: Final = ("pulses_vd", "pulses_id_low_A", "pulses_id_high_A", "pulses_vq"
 UNKNOWN: Final = 0x20
 Q15: Final = 32768.0
 CAPTURED: Final = {"id_A": "i_d_A", "iq_A": "i_q_A", "ud_V": "u_d_V", "uq_V": "u_q_V", "theta_e_rad": "theta_e_deg",
-                   "i_zero_A": "i_zero_A", "sensor_turns": "theta_m_deg"}  # fmt: skip
+                   "i_zero_A": "i_zero_A", "sensor_turns": "theta_m_deg", "v_dc_V": "v_dc_V"}  # fmt: skip
+VOLTAGES: Final = ("u_d_V", "u_q_V")  # which the drive has computed with the dc voltage that its sensor shows
+LINK_S, LINK_SAMPLES, LINK_FALLS_S = 6.0, 1000, 5.0  # until the dc link is off; of a capture; the firmware's limit
 PULSE_SIGNALS: Final = ("id_A", "iq_A", "ud_V", "uq_V", "theta_e_rad", "i_zero_A")
 FORMATS: Final = {"S16": "<h", "U32": "<I", "F32": "<f", "U8": "<B"}
 MARGIN_S: Final = 0.015  # captured beside the pulses: the commands to start them take some milliseconds
@@ -112,7 +114,7 @@ class OverTheBus:
         self._is_moving = self._is_imposed = False
         self._connection = Movement()
         self._failure = 0.0
-        self.lightness, self.strikes, self.struck = LIGHTNESS, False, 0.0
+        self.lightness, self.strikes, self.struck, self.dc_zero_V = LIGHTNESS, False, 0.0, 0.0
         self._prepared: dict[str, float] = {}
         line.pass_time(LISTEN_S)
         self._master = XcpMaster(line)
@@ -179,7 +181,7 @@ class OverTheBus:
         if name == "theta_e_rad":
             return float(np.angle(np.exp(1j * self.capture((name,), ANGLE_PERIODS)[:, 0]).mean()))
         if name == "compensation_V":
-            return self.get("dead_time_compensation") * self._level_share * self.get("v_dc_V")
+            return self.get("dead_time_compensation") * self._level_share * (self.get("v_dc_V") - self.dc_zero_V)
         if name == "compensation_knee_A":
             return self._known.knee_A
         return self._read(self._known_value(name))
@@ -308,6 +310,46 @@ class OverTheBus:
         with contextlib.suppress(FluxtrueError):  # without commands the drive stops by itself
             self.rest(OFF_S)
 
+    # The dc link.
+
+    def discharge(self) -> str:
+        """Mode off: in state standby contactor, precharge and discharge are off, and the dc link is below 60 V."""
+        self._enabled = False
+        self._line.ask(mode="off", enable=False, torque_Nm=0.0)
+        try:
+            self._line.wait_for(("standby",), LINK_S, "the dc link cannot be switched off")
+        except FluxtrueError:
+            if self._line.is_lost:
+                raise
+            return f"the dc link is not off: the inverter is in state {self._line.state or 'unknown'}"
+        return ""
+
+    def dc_link_V(self, seconds: float) -> Array:
+        """As the scope captures it."""
+        periods = round(seconds / self.period_s)
+        return self.capture_during(("v_dc_V",), periods, max(periods // LINK_SAMPLES, 1), self.rest)[:, 0]
+
+    def falling_link_V(self) -> Array:
+        """Charged, then discharged by mode off; nothing if it cannot be charged."""
+        self._line.ask(mode="torque", enable=False)
+        try:
+            self._line.wait_for(("ready",), READY_S, "the dc link cannot be charged")
+        except FluxtrueError:
+            if self._line.is_lost:
+                raise
+            return np.zeros(1)
+
+        def switch_off(seconds: float) -> None:
+            self._line.ask(mode="off")
+            self.rest(seconds)
+
+        periods = round(LINK_FALLS_S / self.period_s)
+        return self.capture_during(("v_dc_V",), periods, math.ceil(periods / WORDS), switch_off)[:, 0]
+
+    def end_discharge(self) -> None:
+        """The mode stays off; the next step charges the dc link."""
+        self._line.ask(mode="off")
+
     def reset_faults(self) -> None:
         """One edge of the reset, after switch_off(). The ECU grants it in state fault."""
         self._line.ask(fault_reset=True)
@@ -366,7 +408,10 @@ class OverTheBus:
         capture = self._scope.read(most=most)
         if capture.warning:
             raise FluxtrueError(f"commission: {capture.warning}")
-        return capture.columns
+        if not self.dc_zero_V:
+            return capture.columns
+        share = 1.0 - self.dc_zero_V / self.get("v_dc_V")
+        return {name: share * column if name in VOLTAGES else column for name, column in capture.columns.items()}
 
     @staticmethod
     def _column(columns: Mapping[str, Array], name: str) -> Array:

@@ -38,12 +38,14 @@ FIRST_SEED = 100
 MOVEMENT = "movement, deg"  # of the machine's rotor in a burst of the map's pulses, electrical, from where it stood
 SHOWN_MOVEMENT = "movement that the sensor shows, deg"  # in steps of up to 0.2 degrees
 LARGEST, FASTEST = "largest current, % of i_max", "largest speed, % of the nameplate's"
-OFFSETS, LEG, FIRST_L = ("offsets of the current sensors, % of the full scale",
+OFFSETS, DC_ZERO, LEG, FIRST_L = ("offsets of the current sensors, % of the full scale",
+                         "offset of the dc voltage's sensor, % of the full scale",
                          "leg voltage, % of the nameplate's error", "L of the first pulses, %")  # fmt: skip
 BOUNDS = {MOVEMENT: 1.0, LARGEST: 100.0, FASTEST: 100.0 * turning.LIMIT_SHARE, "wrong connections": 0.0,
           "map rms, % of psi_max": 100.0 * proof.STEPS["map_rms"], "R, %": 100.0 * proof.STEPS["r_error"],
           "gain balance, %": 100.0 * proof.STEPS["balance"], OFFSETS: 100.0 * proof.STEPS["sensor_offset"],
-          LEG: 100.0 * proof.STEPS["leg_left"], FIRST_L: 100.0 * proof.STEPS["l_error"],
+          DC_ZERO: 100.0 * proof.STEPS["dc_zero"], LEG: 100.0 * proof.STEPS["leg_left"],
+          FIRST_L: 100.0 * proof.STEPS["l_error"],
           "offset, deg": proof.STEPS["offset_deg"], "psi_f, %": 100.0 * proof.STEPS["psi_f_error"],
           "inertia, %": 100.0 * proof.STEPS["inertia_error"], "drag, %": 100.0 * proof.STEPS["drag_error"],
           "harmonics of the angle sensor, deg": proof.STEPS["harmonics_deg"]}  # fmt: skip
@@ -65,7 +67,7 @@ def _standing(found: Found, truth: hidden.Truth, known: Nameplate) -> dict[str, 
     return {"map rms, % of psi_max": 100.0 * reached.map_rms, "R, %": 100.0 * errors["r_error"],
             "R beyond the sensors' gains, %": 100.0 * resistance_error(found.resistance.r_ohm, truth)[1],
             "gain balance, %": 100.0 * errors["balance"], OFFSETS: 100.0 * errors["sensor_offset"],
-            LEG: 100.0 * errors["leg_left"], FIRST_L: 100.0 * errors["l_error"],
+            DC_ZERO: 100.0 * errors["dc_zero"], LEG: 100.0 * errors["leg_left"], FIRST_L: 100.0 * errors["l_error"],
             LARGEST: 100.0 * found.largest_A / known.i_max_A,
             SHOWN_MOVEMENT: float(np.degrees(found.moved_rad))}  # fmt: skip
 

@@ -32,7 +32,9 @@ def nameplate_of(folder: Path, motor: "Motor") -> "Nameplate":
     machine, inverter = config.machine, config.inverter
     level_V = inverter.dead_time_s * inverter.pwm_hz * inverter.vdc_V + inverter.device_drop_V
     return Nameplate(machine.i_max_A, machine.speed_max_rpm, motor.r_ohm, motor.psi_f_Vs, machine.pole_pairs,
-                     machine.inertia_kgm2, level_V, knee_A(config))  # fmt: skip
+                     machine.inertia_kgm2, level_V, knee_A(config), v_dc_full_scale_V=config.v_dc_full_scale_V,
+                     v_dc_offset_V=inverter.v_dc_offset_V, v_dc_offset_max_V=config.v_dc_offset_max_V,
+                     adc_bits=inverter.adc_bits)  # fmt: skip
 
 
 @dataclass(frozen=True)

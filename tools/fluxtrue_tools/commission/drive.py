@@ -26,6 +26,9 @@ PERIODS_MAX = 4000
 SEEN_S, FALLS = 0.01, 6  # a speed is measured in this time, at most so many times until a current has fallen
 STANDING_RPM = 0.5
 LIGHTNESS = 4.0  # before it is known: a rotor that is lighter is turned back less
+VOLTAGES = ("ud_V", "uq_V")  # which the drive has computed with the dc voltage that its sensor shows
+LINK = {"dc_link_F": 5e-4, "dc_load_ohm": 40.0, "contactor_open": 0.0}  # of the bench: falls to 1/e in 20 ms
+LINK_EMPTY_S, LINK_FALLS_S = 0.3, 0.1
 CONNECTION = ("angle_pole_pairs", "angle_reversed", "angle_offset_rad", "angle_imposed")
 
 
@@ -43,6 +46,8 @@ class Capture(Protocol):
     brake_s: float  # of a current that brakes the rotor
     lightness: float  # of the rotor, as a multiple of the guess: what the braking currents have shown
     strikes: bool  # a heavy rotor is braked by pulses
+    dc_zero_V: float  # what the dc voltage's sensor shows without voltage, beyond what the firmware subtracts; voltages
+    # are taken and given without it
     struck: float  # change of the speed by a half wave of pulses over the square of its bound, rpm/A^2; 0: not known
 
     @property
@@ -78,6 +83,18 @@ class Capture(Protocol):
     def let_go(self) -> None:
         """No current and no torque is requested any more."""
 
+    def discharge(self) -> str:
+        """Open the contactor and discharge the dc link as far as the drive does; why it cannot, or nothing."""
+
+    def dc_link_V(self, seconds: float) -> Array:
+        """What the dc voltage's sensor shows, in equal steps."""
+
+    def falling_link_V(self) -> Array:
+        """The same from a charged dc link to a discharged one."""
+
+    def end_discharge(self) -> None:
+        """The contactor may close again."""
+
     def prepare(self, values: Mapping[str, float]) -> None:
         """Do what takes time before pulse() with the same values."""
 
@@ -100,7 +117,8 @@ class SoftwareInTheLoop:
         self.period_s = loop.period_s
         self.passed: Callable[[float], None] = nothing
         self.lightness = LIGHTNESS
-        self.struck = 0.0
+        self.struck = self.dc_zero_V = 0.0
+        self._link: Loop | None = None  # without its battery
 
     @staticmethod
     def _allowed(name: str) -> str:
@@ -119,7 +137,11 @@ class SoftwareInTheLoop:
         value = self._loop.get(self._allowed(name))
         if math.isnan(value):
             raise FluxtrueError(f"{name}: this firmware has no such value")
-        return value
+        return value * self._voltage_share() if name == "compensation_V" else value
+
+    def _voltage_share(self) -> float:
+        """Of a voltage that the drive has computed, which the inverter makes of it."""
+        return 1.0 - self.dc_zero_V / self._loop.get("vdc_V") if self.dc_zero_V else 1.0
 
     def capture(self, names: Sequence[str], periods: int) -> Array:
         """Every period, by reading the names after it."""
@@ -130,6 +152,9 @@ class SoftwareInTheLoop:
         self._loop.record(list(names))
         rows = self._loop.run(periods)
         self.passed(periods * self.period_s)
+        voltages = [n for n, name in enumerate(names) if name in VOLTAGES]
+        if voltages and self.dc_zero_V:
+            rows[:, voltages] *= self._voltage_share()
         return rows
 
     def rest(self, seconds: float) -> None:
@@ -168,6 +193,39 @@ class SoftwareInTheLoop:
         self.set("id_ref_A", 0.0)
         self.set("iq_ref_A", 0.0)
         self.set("current_mode", 0.0)
+
+    # The dc link is measured on a drive of its own, before it is switched on: the noise of the others stays what it is.
+
+    def _link_V(self, seconds: float) -> Array:
+        assert self._link is not None
+        self._link.record(("vdc_V",))
+        rows = self._link.run(round(seconds / self.period_s))
+        self.passed(seconds)
+        return rows[:, 0]
+
+    def _open_contactor(self) -> None:
+        self._link = self._loop.again(LINK)
+        self._link_V(LINK_FALLS_S)
+        self._link.set("plant.contactor_open", 1.0)
+
+    def discharge(self) -> str:
+        """The bench opens its contactor beside a resistor."""
+        self._open_contactor()
+        self._link_V(LINK_EMPTY_S)
+        return ""
+
+    def dc_link_V(self, seconds: float) -> Array:
+        """Every period."""
+        return self._link_V(seconds)
+
+    def falling_link_V(self) -> Array:
+        """From the battery's voltage on."""
+        self._open_contactor()
+        return self._link_V(LINK_FALLS_S)
+
+    def end_discharge(self) -> None:
+        """The bench closes its contactor."""
+        self._link = None
 
     def prepare(self, values: Mapping[str, float]) -> None:
         """Nothing: setting the values takes no time."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from fluxtrue_tools import strict
 from fluxtrue_tools.commission import iron
+from fluxtrue_tools.commission.dc_zero import DcZero
 from fluxtrue_tools.commission.iron import Iron
 from fluxtrue_tools.commission.levels import Resistance
 from fluxtrue_tools.commission.nameplate import Nameplate
@@ -27,6 +28,7 @@ from fluxtrue_tools.motor.references import Solver
 NODES = 31
 TORQUE_GUESSED = 0.95  # of what the magnet gives
 TORQUE_SHARE = 0.98  # of what the map gives
+DC_DIGITS = 4  # after the point, V
 BY = "measured by fluxtrue commission"
 
 
@@ -97,6 +99,7 @@ def write(found: Found, known: Nameplate, nameplate: Path, staging: Path, out: P
         raise FluxtrueError("commission: nothing for a motor's folder was measured: wanted: --step all, phases, "
                             "resistance or map")  # fmt: skip
     entries = _entries(nameplate, out)
+    _of_the_dc_zero(found.dc_zero, entries["inverter"])
     _of_the_turning(found, known, entries["machine"])
     if found.resistance is not None:
         _of_the_levels(found.resistance, entries)
@@ -105,6 +108,12 @@ def write(found: Found, known: Nameplate, nameplate: Path, staging: Path, out: P
         _of_the_iron(iron.measure(found.spun, found.surface.with_magnet(known.psi_f_Vs), known.i_max_A), entries)
     (staging / FILE_NAME).write_text(_text(entries), encoding="utf-8")
     return grid, load_motor(staging)
+
+
+def _of_the_dc_zero(zero: DcZero, inverter: dict[str, Entry]) -> None:
+    if not zero.unknown:
+        source = f"{BY}: {zero.how}, ±{zero.sigma_V:.1g} V"
+        inverter["v_dc_offset_V"] = Entry(round(zero.value_V, DC_DIGITS), source)
 
 
 def _of_the_turning(found: Found, known: Nameplate, machine: dict[str, Entry]) -> None:

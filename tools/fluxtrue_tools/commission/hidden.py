@@ -112,6 +112,12 @@ def _sensors(rng: np.random.Generator, full_scale_A: float) -> dict[str, float]:
     return errors
 
 
+def _dc_zero(name: str, seed: int, full_scale_V: float) -> dict[str, float]:
+    """Of the dc voltage's sensor, whose converter shows nothing below 0; a dc link that discharges to 10 mV."""
+    rng = np.random.default_rng([seed, sum(name.encode()), 4])
+    return {"vdc_offset_V": float(rng.uniform(-0.01, 0.01)) * full_scale_V, "vdc_least_V": 0.01}
+
+
 def _connection(name: str, seed: int, pole_pairs: int) -> dict[str, float]:
     """Nothing of how sensor and leads are connected is known. Half to twice the pole pairs of the nameplate: with
     others the machine would not reach the nameplate's largest speed, or could turn much faster."""
@@ -193,6 +199,7 @@ def draw(
         "viscous_Nms": 1e-4 * motor.torque_max_Nm * float(rng.uniform(0.5, 2.0)),
         "seed": float(rng.integers(1, 1 << 40)),
     }  # fmt: skip
+    plant |= _dc_zero(name, seed, base["vdc_full_scale_V"])
     if not connected:
         plant |= _connection(name, seed, round(base["pole_pairs"]))
     if flux_map is None:

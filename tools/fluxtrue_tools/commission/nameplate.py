@@ -21,6 +21,10 @@ class Nameplate:
     level_V: float  # lost by a leg of the inverter
     knee_A: float  # from which the drive compensates all of it
     psi_f_source: str = ""  # of psi_f_Vs, when the user has given a better value than the guess
+    v_dc_full_scale_V: float = 0.0
+    v_dc_offset_V: float = 0.0  # that the firmware subtracts
+    v_dc_offset_max_V: float = 0.0  # that it can subtract
+    adc_bits: int = 12
     offset_A: complex = 0.0  # of the current sensors in the stationary frame, as soon as it is measured
 
     @property

@@ -21,6 +21,7 @@ from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import (
     Score,
     Turned,
+    dc_zero_error,
     harmonics_deg,
     resistance_error,
     score,
@@ -49,6 +50,10 @@ def measure(drive: OverTheBus, truth: Truth, known: Nameplate, steps: list[Step]
     begun = time.process_time()
     found = run(drive, steps, known, click.echo)
     click.echo(f"{drive.line.now_s:.0f} s of the bus, {time.process_time() - begun:.0f} s of the evaluation")
+    if found.dc_zero.unknown:
+        click.echo(f"offset of the dc voltage's sensor: not found: {found.dc_zero.unknown}")
+    click.echo(f"offset of the dc voltage's sensor: {100.0 * dc_zero_error(found.dc_zero, truth):+.3f} % of the full "
+               "scale")  # fmt: skip
     if found.followed is not None:
         click.echo(f"connection: {found.followed.connection}, true: {truth.plant['pole_pairs']:.0f} pole pairs, "
                    f"reversed {truth.reversed}, {truth.offset_rad:.4f} rad")  # fmt: skip

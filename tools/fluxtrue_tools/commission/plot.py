@@ -121,6 +121,9 @@ def _offset(axes: Axes, found: Found, _: Nameplate) -> None:
     axes.set(title="Current shown without current", xlabel="alpha, A", ylabel="beta, A", aspect="equal",
              xlim=(-reach, reach), ylim=(-reach, reach))  # fmt: skip
     axes.legend(fontsize=8)
+    zero = found.dc_zero
+    said = "not found" if zero.unknown else f"{zero.value_V:+.3f} V ±{zero.sigma_V:.1g} V"
+    axes.text(0.02, 0.02, f"offset of the dc voltage: {said}", transform=axes.transAxes, fontsize=8)
 
 
 def _levels(axes: Axes, found: Found, _: Nameplate) -> None:

@@ -20,6 +20,7 @@ from fluxtrue_tools.commission.driven import NAMEPLATE, ROBUST, TABLES
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import (
     balance_error,
+    dc_zero_error,
     inductance_error,
     iron_error,
     leg_errors,
@@ -39,7 +40,7 @@ TABLES_RMS, TABLES_P95 = 1.5, 3.0  # percent
 CAMPAIGN: Final = Limits()
 STEPS: Final = {"map_rms": 0.01, "r_error": 0.01, "balance": 0.002, "offset_deg": 0.2,
                 "harmonics_deg": 0.2, "psi_f_error": 0.005, "inertia_error": 0.03, "drag_error": 0.1,
-                "sensor_offset": 0.001, "leg_left": 0.2, "l_error": 0.2}  # fmt: skip
+                "sensor_offset": 0.001, "dc_zero": 0.001, "leg_left": 0.2, "l_error": 0.2}  # fmt: skip
 """What the steps themselves must find, for 95 % of the machines; the iron loss has no bound."""
 OTHER_FACTOR: Final = 2.0  # of every bound, for the machines with other errors
 STRATA: Final = (6, 4)
@@ -77,6 +78,7 @@ def standing(found: Found, truth: hidden.Truth, known: Nameplate) -> dict[str, f
     assert found.resistance is not None and found.balance is not None and found.first is not None
     return {"r_error": resistance_error(found.resistance.r_ohm, truth)[0],
             "balance": balance_error(found.balance, truth), "sensor_offset": offset_error(found.offset_A, truth),
+            "dc_zero": dc_zero_error(found.dc_zero, truth),
             "leg_left": leg_errors(found.resistance.total_V, truth, known.level_V)[1],
             "l_error": inductance_error(found.first, truth, known.i_max_A)}  # fmt: skip
 

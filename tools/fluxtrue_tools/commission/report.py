@@ -5,6 +5,7 @@ import math
 from typing import Final
 
 from fluxtrue_tools.commission import iron
+from fluxtrue_tools.commission.dc_zero import DcZero
 from fluxtrue_tools.commission.drag import coupled, inertia_text
 from fluxtrue_tools.commission.harmonics import LARGE_RAD, SIGMAS, Harmonics, Wave
 from fluxtrue_tools.commission.nameplate import Nameplate
@@ -35,6 +36,13 @@ def _harmonics(found: Harmonics | None) -> list[str]:
                      "check how it is mounted (centred, parallel to the shaft, at the right distance, away from "
                      "magnetic fields), and measure again")  # fmt: skip
     return lines
+
+
+def _dc_zero(zero: DcZero) -> str:
+    if zero.unknown:
+        return (f"dc-voltage sensor: offset not found, {zero.subtracted_V:+.3g} V as before: {zero.unknown}; compare "
+                "the dc voltage with a voltmeter")  # fmt: skip
+    return f"dc-voltage sensor: offset {zero.value_V:+.3f} V, ±{zero.sigma_V:.1g} V ({zero.how})"
 
 
 def _turning(found: Found, known: Nameplate) -> list[str]:
@@ -109,7 +117,9 @@ def _iron(found: Found, known: Nameplate) -> list[str]:
 def text(found: Found, known: Nameplate, grid: Grid | None) -> str:
     """The report."""
     lines = [
-        f"current sensors: offset {found.offset_A.real:+.3f} A along alpha, {found.offset_A.imag:+.3f} A along beta"
+        f"current sensors: offset {found.offset_A.real:+.3f} A along alpha, {found.offset_A.imag:+.3f} A along beta, "
+        f"±{found.offset_sigma_A:.1g} A",
+        _dc_zero(found.dc_zero),
     ]
     lines += _turning(found, known) + _levels(found, known)
     if found.surface is not None and grid is not None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fluxtrue_tools.commission.balance import Balance
+from fluxtrue_tools.commission.dc_zero import DcZero
 from fluxtrue_tools.commission.hidden import Truth
 from fluxtrue_tools.commission.iron import Iron
 from fluxtrue_tools.commission.plan import FIRST_CURRENT, First
@@ -66,6 +67,11 @@ def offset_error(offset_A: complex, truth: Truth) -> float:
     true_A = sum(2.0 / 3.0 * plant[f"current_offset_A_{phase}"] * cmath.rect(1.0, 2.0 * math.pi * k / 3.0)
                  for k, phase in enumerate(_order(truth)))  # fmt: skip
     return abs(offset_A - true_A) / plant["current_full_scale_A"]
+
+
+def dc_zero_error(found: DcZero, truth: Truth) -> float:
+    """As a share of the full scale of the dc voltage; of what the firmware subtracts if nothing was found."""
+    return (found.value_V - truth.plant["vdc_offset_V"]) / truth.plant["vdc_full_scale_V"]
 
 
 def leg_errors(total_V: float, truth: Truth, guess_V: float) -> tuple[float, float]:

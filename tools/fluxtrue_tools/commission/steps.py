@@ -10,11 +10,23 @@ from typing import Protocol
 
 from tqdm import tqdm
 
-from fluxtrue_tools.commission import balance, bus_turning, connection, drag, levels, plan, spin, surface, turning
+from fluxtrue_tools.commission import (
+    balance,
+    bus_turning,
+    connection,
+    dc_zero,
+    drag,
+    levels,
+    plan,
+    spin,
+    surface,
+    turning,
+)
 from fluxtrue_tools.commission.balance import Balance
 from fluxtrue_tools.commission.bursts import Raw, offset
 from fluxtrue_tools.commission.bus import OverTheBus
 from fluxtrue_tools.commission.connection import Followed
+from fluxtrue_tools.commission.dc_zero import DcZero
 from fluxtrue_tools.commission.drag import Drag
 from fluxtrue_tools.commission.drive import Capture, nothing
 from fluxtrue_tools.commission.levels import Resistance
@@ -43,6 +55,7 @@ class Found:
     bursts: list[Raw] = field(default_factory=list)
     balance: Balance | None = None
     surface: Surface | None = None
+    dc_zero: DcZero = field(default_factory=DcZero)
 
     def known(self, known: Nameplate) -> Nameplate:
         """The nameplate with what has been measured in its place."""
@@ -97,9 +110,10 @@ def _disable(drive: Capture) -> None:
     drive.rest(SETTLE_S)
 
 
-def _offsets(drive: Capture, found: Found, _: Nameplate) -> None:
+def _offsets(drive: Capture, found: Found, known: Nameplate) -> None:
     _disable(drive)
     found.offset_A, found.offset_sigma_A = offset(drive)
+    found.dc_zero = dc_zero.measure(drive, known)
 
 
 def _phases(drive: Capture, found: Found, known: Nameplate) -> None:
@@ -175,7 +189,8 @@ def _map(drive: Capture, found: Found, known: Nameplate) -> None:
 
 
 STEPS = (
-    Step("offsets", "switching is disabled, nothing moves, no current", _offsets, 0.15),
+    Step("offsets", "switching is disabled, nothing moves, no current; the dc link is discharged, charged and "
+         "discharged again", _offsets, 1.8, 12.0),
     Step(connection.NAME, "a current of up to {vector:.3g} A that does not turn with the rotor: the shaft turns "
          "slowly, by up to {turns:g} turns divided by the pole pairs, and back", _phases, 10.0, 20.0),
     Step(spin.NAME, "the shaft turns at {speed:.0f} rpm in both directions, for moments somewhat faster, with up to "
@@ -248,6 +263,7 @@ def _go(drive: Capture, steps: list[Step], known: Nameplate, say: Callable[[str]
             say(f"{step.name}: kept from an earlier run")
             continue
         say(f"{step.name}: {announcement(step, found.known(known))}")
+        drive.dc_zero_V = found.dc_zero.shown_V
         with shown(drive, step):
             step.run(drive, found, found.known(known))
         done = (*done, step.name)

@@ -16,6 +16,7 @@ import numpy as np
 
 from fluxtrue_tools.commission.bursts import Raw
 from fluxtrue_tools.commission.connection import Followed
+from fluxtrue_tools.commission.dc_zero import DcZero
 from fluxtrue_tools.commission.drag import Drag
 from fluxtrue_tools.commission.harmonics import Harmonics
 from fluxtrue_tools.commission.levels import Resistance
@@ -28,8 +29,10 @@ from fluxtrue_tools.outputs import atomic
 
 NAME: Final = "steps.json"
 TYPES: Final = {kind.__name__: kind
-               for kind in (Connection, Followed, Harmonics, Spun, Drag, Resistance, First, Raw)}  # fmt: skip
-KEPT: Final = ("offset_A", "offset_sigma_A", "followed", "spun", "drag", "resistance", "first", "levels")  # of Found
+               for kind in (DcZero, Connection, Followed, Harmonics, Spun, Drag, Resistance, First, Raw)}  # fmt: skip
+# Of Found.
+KEPT: Final = ("offset_A", "offset_sigma_A", "dc_zero", "followed", "spun", "drag", "resistance", "first",
+               "levels")  # fmt: skip
 LAST: Final = "map"
 
 

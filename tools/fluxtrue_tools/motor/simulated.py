@@ -45,7 +45,7 @@ class DataLoop(Loop):
     """A simulated drive whose firmware has the motor's data."""
 
     def __init__(self, motor: Simulated, plant: Mapping[str, float]) -> None:
-        self._data = motor.data
+        self._motor, self._data = motor, motor.data
         self.periods = 0  # since the start
         super().__init__(motor.library, motor.plant | dict(plant), motor.flux_map)
 
@@ -56,6 +56,10 @@ class DataLoop(Loop):
         if not created:
             raise FluxtrueError(f"the simulation library of {LIBRARY_OF} was built from another source")
         return created
+
+    def again(self, changes: Mapping[str, float]) -> "DataLoop":
+        """With the same data."""
+        return DataLoop(self._motor, self._plant | dict(changes))
 
     def run(self, periods: int, ramps: Mapping[str, tuple[float, float]] | None = None) -> Array:
         """Counts them: the 1 kHz task runs at the end of every periods_per_step-th."""

@@ -120,6 +120,7 @@ class Loop:
         controller: str = "firmware",
     ) -> None:
         self._library = library
+        self._plant, self._flux_map, self._controller = dict(plant), flux_map, controller
         self._sim = self._create(controller)
         if not self._sim:
             raise MemoryError("sim_create")
@@ -139,6 +140,10 @@ class Loop:
         """The simulation without its plant."""
         created: int | None = self._library.sim_create(CONTROLLERS[controller])
         return created
+
+    def again(self, changes: Mapping[str, float]) -> "Loop":
+        """Another simulation of the same drive from its start, with changes of the plant."""
+        return Loop(self._library, self._plant | dict(changes), self._flux_map, self._controller)
 
     def close(self) -> None:
         """Release the memory; afterwards the object cannot be used."""

@@ -7,12 +7,13 @@ from typing import Final
 import numpy as np
 
 from fluxtrue_tools.commission import connection, plan
+from fluxtrue_tools.commission.dc_zero import DcZero
 from fluxtrue_tools.commission.drag import coupled, inertia_text
 from fluxtrue_tools.commission.harmonics import LARGE_RAD, Harmonics
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.steps import Found
 
-TITLES: Final = {"offsets": "Current sensors at rest", "phases": "Leads, angle sensor and pole pairs",
+TITLES: Final = {"offsets": "Sensors at rest", "phases": "Leads, angle sensor and pole pairs",
                  "spin": "Angle offset and magnet", "drag": "Inertia and drag",
                  "resistance": "Resistance and inverter", "map": "Flux map"}  # fmt: skip
 # What tests/commission requires of hidden machines.
@@ -22,10 +23,18 @@ ANGLE_DEG, HARMONIC_DEG, PSI_SHARE, INERTIA_SHARE, DRAG_SHARE = 0.2, 0.2, 0.005,
 Row = tuple[str, str, str, str]  # what, found, ±, bound
 
 
-def _offsets(found: Found, _: Nameplate, full_scale_A: float) -> list[Row]:
+def _dc_zero(zero: DcZero, known: Nameplate) -> list[Row]:
+    if zero.unknown:
+        return [("Offset of the dc-voltage sensor", f"not found: {zero.unknown}", "", "")]
+    return [("Offset of the dc-voltage sensor", f"{zero.value_V:+.3f} V", f"{zero.sigma_V:.2g} V",
+             f"± at most {OFFSET_SHARE * known.v_dc_full_scale_V:.2g} V")]  # fmt: skip
+
+
+def _offsets(found: Found, known: Nameplate, full_scale_A: float) -> list[Row]:
     sigma, bound = f"{found.offset_sigma_A:.2g} A", f"± at most {OFFSET_SHARE * full_scale_A:.2g} A"
-    return [(f"Offset along {axis}", f"{value:+.3f} A", sigma, bound)
-            for axis, value in (("alpha", found.offset_A.real), ("beta", found.offset_A.imag))]  # fmt: skip
+    currents = [(f"Offset along {axis}", f"{value:+.3f} A", sigma, bound)
+                for axis, value in (("alpha", found.offset_A.real), ("beta", found.offset_A.imag))]  # fmt: skip
+    return [*currents, *_dc_zero(found.dc_zero, known)]
 
 
 def _way(is_reversed: bool) -> str:
