@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from fluxtrue_tools.commission import spin, turning
 from fluxtrue_tools.commission.drive import Capture
@@ -22,6 +23,7 @@ COAST_END = 0.4
 SLOWEST = 0.1  # of the largest speed of the run: below it the drag is not evaluated
 LEAST_SHARE = 0.2  # of the largest current of the run
 BENDS = (-8.0, 1.0)  # of psi_f: what i_max along q may add to psi_d with the slope at small currents, the steepest
+SLOPES = (0.0, 12.0)  # the same of i_max along d to psi_d and of i_max along q to psi_q; up to 8.8 was drawn
 SHOWN = (0.4, 1.0)  # of the largest speed of the run: where the drag is shown
 HEAVY = 3.0  # times the nameplate's guess of the inertia; of the simulated machines none has more than 1.9
 FINE_KGM2 = 1e-3  # below it an inertia is shown in kg·mm²
@@ -128,24 +130,28 @@ class Flux:
 def flux_under_current(runs: list[_Run], psi_f_Vs: float, i_max_A: float) -> Flux:
     """(CM-20): a part that is neither proportional to the speed nor independent of it is no flux.
 
-    A light rotor is accelerated by so little current that the errors of the voltages are larger than the flux linkage
-    of saturation: this one has a bound.
+    A light rotor is accelerated by so little current that the errors of the voltages are larger than the flux linkages
+    of the currents, and along d it has none but those of the sensors' offsets: inductances and saturation have bounds.
     """
     speed, i, psi, steady = (np.concatenate([getattr(run, name) for run in runs])
                              for name in ("speed", "i", "psi", "is_steady"))  # fmt: skip
     used = steady & (np.abs(i.imag) > LEAST_SHARE * np.abs(i.imag).max()) & (speed > SLOWEST * speed.max())
     w, d, q = speed[used], i[used].real, i[used].imag
+    inductance, bend = (np.array(shares) * psi_f_Vs / i_max_A**n for n, shares in ((1, SLOPES), (2, BENDS)))
     along = np.column_stack((d * w, q**2 * w, q, np.sign(q)))
-    l_d, bend, *_ = _solve(along, (psi[used].real - psi_f_Vs) * w)
-    l_q, *_ = _solve(np.column_stack((q * w, d, np.ones(len(w)))), psi[used].imag * w)
-    least, most = (share * psi_f_Vs / i_max_A**2 for share in BENDS)
-    return Flux(psi_f_Vs, l_d, min(max(bend, least), most), l_q)
+    l_d, bent = _bounded(along, (psi[used].real - psi_f_Vs) * w, [inductance, bend])
+    across = np.column_stack((q * w, d, np.ones(len(w))))
+    (l_q,) = _bounded(across, psi[used].imag * w, [inductance])
+    return Flux(psi_f_Vs, l_d, bent, l_q)
 
 
-def _solve(matrix: Array, values: Array) -> list[float]:
+def _bounded(matrix: Array, values: Array, bounds: list[Array]) -> list[float]:
+    """Least squares; of the unknowns that have bounds, which come first."""
     scale = np.linalg.norm(matrix, axis=0)
-    x, *_ = np.linalg.lstsq(matrix / scale, values, rcond=1e-4)
-    return [float(each) for each in x / scale]
+    least, most = np.full(len(scale), -np.inf), np.full(len(scale), np.inf)
+    least[: len(bounds)], most[: len(bounds)] = np.transpose(bounds)
+    found = lsq_linear(matrix / scale, values, (least * scale, most * scale))
+    return [float(each) for each in (found.x / scale)[: len(bounds)]]
 
 
 def _impulse(run: _Run, torque: Array, spacing_s: float) -> Array:
