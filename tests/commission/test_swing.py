@@ -138,6 +138,7 @@ def recorded(small: Motor, plate: Nameplate) -> tuple[Watched, dict[str, float],
     """A burst of 40 A along q, and what the sensors show along q without current: 2 A at most."""
     _, flux_map, plant = hidden.draw("anaheim", 101, small, plate.i_max_A)
     plant |= {f"current_offset_A_{phase}": value for phase, value in zip("abc", (-2.0, 1.0, 1.0), strict=True)}
+    plant["vdc_offset_V"] = 0.0  # no step has measured it
     drive = Watched(Loop(small.library, plant, flux_map))
     known = replace(plate, offset_A=-2.0 + 0.0j)
     _enable(drive)
