@@ -23,7 +23,7 @@
 #include "types/operating_point.h"
 #include "types/samples.h"
 
-/** One period as the fast ISR measured it. Writer: fast ISR. Reader: 1 kHz task. */
+/** One period as the fast ISR measured it. Writer: fast ISR. Readers: 1 kHz task, MRAI interrupt. */
 typedef struct {
     operating_point_t point;
     uint32_t theta_e;     /* of the samples, 2^32 = one turn */

@@ -67,7 +67,7 @@ void publish_sample(drive_t *drive, const sample_t *sample)
     const uint32_t generation = sample_box_publish(&drive->samples);
     const bool completes_step = generation == fast->step_end;
     if (mrai_is_chosen(drive)) {
-        mrai_offer(drive, sample, generation);
+        mrai_offer(drive, generation);
         if (completes_step) {
             identify_window_invalidate(&fast->window); /* the next one would lack its first sample */
             begin_step(drive, generation + drive->period.periods_per_step);

@@ -16,16 +16,13 @@ static FX_NOT_INLINED FX_COLD void count_overrun(drive_t *drive, uint32_t genera
     }
 }
 
-void mrai_offer(drive_t *drive, const sample_t *sample, uint32_t generation)
+void mrai_offer(drive_t *drive, uint32_t generation)
 {
     mrai_mailbox_t *mailbox = &drive->mrai.mailbox;
     if (mailbox->generation != drive->mrai.isr.finished) {
         count_overrun(drive, generation);
         return;
     }
-    mailbox->point = sample->point;
-    mailbox->acting = sample->acting;
-    exchange_barrier();
     mailbox->generation = generation;
     hal_irq_pend_mrai();
 }

@@ -8,14 +8,12 @@
  * Context  part of drive_t; a build without FLUXTRUE_MRAI has none of it */
 #include "control/mrai/schedule.h"
 #include "control/mrai/torque_estimate.h"
-#include "types/operating_point.h"
 
-/** One operating point on its way to the MRAI interrupt. Writer: fast ISR, only after the interrupt has finished the
- * previous point (generation == finished), so the interrupt reads it in place. */
+/** Which sample's operating point the MRAI interrupt is to use. Writer: fast ISR, only after the interrupt has finished
+ * the previous one (generation == finished). The interrupt reads the sample in place: its slot is written again 64
+ * periods later, and when three of them have come before the interrupt finished, overrun is latched. */
 typedef struct {
-    operating_point_t point;
-    bool acting;                  /* the bridge was on throughout the last period and is on now */
-    volatile uint32_t generation; /* of the sample it was taken from */
+    volatile uint32_t generation; /* of the sample */
     uint32_t overruns;            /* periods whose point was dropped because the previous one was not finished */
 } mrai_mailbox_t;
 

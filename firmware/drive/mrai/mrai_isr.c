@@ -17,13 +17,13 @@ static FX_NOT_INLINED FX_COLD void reset_if_requested(drive_t *drive)
  * unknown, or the previous point was dropped, or after a reset, the observer starts from the measured currents. */
 void mrai_isr(drive_t *drive)
 {
-    const mrai_mailbox_t *mailbox = &drive->mrai.mailbox;
-    const operating_point_t *point = &mailbox->point;
-    const uint32_t generation = mailbox->generation;
+    const uint32_t generation = drive->mrai.mailbox.generation;
+    const sample_t *sample = sample_box_at(&drive->samples, generation);
+    const operating_point_t *point = &sample->point;
     mrai_isr_state_t *state = &drive->mrai.isr;
     const mrai_schedule_t *schedule = schedule_box_read(&drive->mrai.schedules);
 
-    const bool starts = !mailbox->acting || generation - state->finished != 1U ||
+    const bool starts = !sample->acting || generation - state->finished != 1U ||
                         drive->request.identification_resets != state->identification_resets;
     if (starts) {
         reset_if_requested(drive);

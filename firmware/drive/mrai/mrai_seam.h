@@ -30,7 +30,7 @@ static inline bool mrai_is_chosen(const drive_t *drive)
 }
 
 /** Fast ISR, after the sample has been published as this generation. */
-void mrai_offer(drive_t *drive, const sample_t *sample, uint32_t generation);
+void mrai_offer(drive_t *drive, uint32_t generation);
 /** Fast ISR: whether one of the last periods, up to this generation, went to the law. A dropped point is not detected
  * here. If the law was never chosen, the overflow of the generation after 2^32 periods reads as true, too. */
 static inline bool mrai_had_one_of(const drive_t *drive, uint32_t generation, uint32_t periods)
@@ -74,10 +74,9 @@ static inline bool mrai_is_chosen(const drive_t *drive)
     return false;
 }
 
-static inline void mrai_offer(drive_t *drive, const sample_t *sample, uint32_t generation)
+static inline void mrai_offer(drive_t *drive, uint32_t generation)
 {
     (void)drive;
-    (void)sample;
     (void)generation;
 }
 
