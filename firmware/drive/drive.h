@@ -21,6 +21,7 @@
 #include "drive/motor.h"
 #include "drive/movement.h"
 #include "drive/pulses.h"
+#include "safety/gain_jump.h"
 #include "types/features.h"
 #include "types/identification.h"
 #include "types/motor_check.h"
@@ -161,6 +162,7 @@ typedef struct {
     plausibility_state_t plausibility;
     torque_monitor_state_t torque_monitor;
     frozen_angle_state_t frozen_angle;
+    gain_jump_state_t gain_jump;
     launch_power_state_t launch_power;
     int32_t monitored_dead_time_q16; /* compensation of the last step, for the monitors of a standing angle */
     commission_state_t commission;

@@ -102,11 +102,10 @@ static bool is_torque_excessive(const torque_monitor_config_t *config, torque_mo
 
 /* The back-EMF does not fit the angle (MN-9), (MN-10). */
 static bool is_angle_implausible(const torque_monitor_config_t *config, const torque_monitor_in_t *in,
-                                 const machine_t *now, dq_q15_t emf, dq_q15_t rate, dq_q15_t psi)
+                                 const machine_t *now, dq_q15_t residual, dq_q15_t rate)
 {
     const q15_t speed_abs = fx_abs_q15(now->speed.omega);
-    const int32_t e_d = emf.d + fx_mul_q15(now->speed.omega, psi.q);
-    const int32_t e_q = emf.q - fx_mul_q15(now->speed.omega, psi.d);
+    const int32_t e_d = residual.d, e_q = residual.q;
     const int32_t e_magnet = (now->speed.omega < 0) ? -e_q : e_q;
     const int32_t emf_nominal = fx_mul_q15(speed_abs, config->psi_f);
     const int32_t d_share = fx_mul_q15(PSI_D_AXIS, emf_nominal);
@@ -146,8 +145,12 @@ uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monit
     const q15_t drop_q = fx_mul_gain_q15(now.r.r, (q15_t)in->i.q);
     const dq_q15_t emf = {fx_sat_q15(in->u.d - drop_d - rate.d), fx_sat_q15(in->u.q - drop_q - rate.q)};
     const bool torque_bad = is_torque_excessive(config, state, in, &now, emf, rate);
-    const dq_q15_t emf_mean = {fx_sat_q15(in->u_mean.d - drop_d - rate.d), fx_sat_q15(in->u_mean.q - drop_q - rate.q)};
-    const bool angle_bad = is_angle_implausible(config, in, &now, emf_mean, rate, psi_mean);
+    const dq_q15_t residual = {
+        fx_sat_q15(in->u_mean.d - drop_d - rate.d) + fx_mul_q15(now.speed.omega, (q15_t)psi_mean.q),
+        fx_sat_q15(in->u_mean.q - drop_q - rate.q) - fx_mul_q15(now.speed.omega, (q15_t)psi_mean.d),
+    };
+    state->residual = (dq_q15_halfword_t){fx_sat_q15(residual.d), fx_sat_q15(residual.q)};
+    const bool angle_bad = is_angle_implausible(config, in, &now, residual, rate);
     return debounce_step(&state->torque, torque_bad, config->torque_steps, FAULT_TORQUE) |
            debounce_step(&state->angle, angle_bad, config->angle_steps, FAULT_ANGLE_OFFSET);
 }

@@ -30,6 +30,16 @@ def test_all_currents_30_percent_too_small_are_found_at_speed_and_torque(
 
 
 @pytest.mark.parametrize("gain", [0.7, 0.9, 1.1, 1.3])
+def test_a_jump_of_the_gain_of_all_currents_is_found_with_torque(hsm1: Motor, gain: float) -> None:
+    """At any speed at which 10 % of the current's voltage is more than the inverter's error."""
+    for (rpm, torque), sign in itertools.product(((600, -100), (1000, 100), (3000, 100), (6000, 40)), (1, -1)):
+        fault = {f"current_gain_{x}": gain for x in "abc"}
+        seen = inject(hsm1, rpm, sign * torque, fault, 0.03, current_noise_A_rms=0.5)
+        assert seen.found_ms <= 26.0, (rpm, sign * torque, seen)
+        assert seen.names == ("input",), (rpm, sign * torque, seen)
+
+
+@pytest.mark.parametrize("gain", [0.7, 0.9, 1.1, 1.3])
 @pytest.mark.parametrize("known", [0.97, 1.03])
 def test_a_wrong_reference_of_the_converters_is_found(hsm1: Motor, gain: float, known: float) -> None:
     """Currents and dc voltage read too large by `gain`; the known voltage itself is 3 % off."""
