@@ -8,7 +8,8 @@
  *   T_m is T* after the first-order response of the closed current loop, so that a step of T* does not charge the
  *   integrator.
  *   While the voltage or current limit is active, x does not rise above 0, and an x above 0 decays at a quarter of the
- *   loop's own rate; while the loop is disabled, x decays to 0 at that rate. The authority A is scaled by the confidence c in the estimate: at c = 0 nothing is corrected.
+ *   loop's own rate; while the loop is disabled, x decays to 0 at that rate. The authority A is scaled by the
+ *   confidence c in the estimate: at c = 0 nothing is corrected.
  * Source   docs/theory/torque-loop.md (TL-3) ... (TL-9)
  * Units    per unit of T_b; x is a ratio
  * Range    authority (0, 1); |T*| < 1; the relative error e / max(|T*|, T_min) is limited to 1
