@@ -33,7 +33,6 @@
  *   FX_NOT_INLINED            210 bytes of the control library; the fast ISR would have 1 less without
  *   FX_INLINED                104 instructions of the 1 kHz task
  *   FX_INLINES_CALLS          108 instructions of the fast ISR
- *   FX_COMPUTED_LATE          0.3 instructions of the fast ISR with the AD2S1210
  * Source   our own measurement; Arm v7-M ARM A7.7.50 (LDRD needs word alignment only)
  * Units    none
  * Range    every value and every address of two words
@@ -50,9 +49,6 @@
 
 /* Of a function: a call of it is rare, so that it is compiled for size and its callers keep their registers. */
 #define FX_COLD __attribute__((cold))
-/* Of a function: nothing is computed before the branch after which it is needed, only to be at hand on both sides of
- * it. In a function as long as a period such values are stored and loaded again, because all registers are in use. */
-#define FX_COMPUTED_LATE __attribute__((optimize("no-tree-pre")))
 /* One copy of its instructions for all callers. */
 #define FX_NOT_INLINED __attribute__((noinline))
 /* A copy of its instructions in each caller, or in this function those of everything that it calls. */

@@ -67,7 +67,7 @@ static FX_NOT_INLINED FX_COLD void alarms_take(void)
 }
 
 /* With link-time optimisation the period is compiled into the handler. */
-FX_COMPUTED_LATE void adc_handler(void)
+void adc_handler(void)
 {
     if (alarms.any != 0U) {
         alarms_take();
