@@ -9,7 +9,8 @@
  * Context  1 kHz task, before the torque monitor of the same step, whose residual of the last step it compares */
 #include "drive/drive.h"
 
-/** comparable: the window of this step is complete, and the bridge acts. */
+/** comparable: the window of this step is complete, the bridge acts, and the compensation of dead time is that of the
+ * last step. */
 uint32_t common_gain_step(drive_t *drive, const snapshot_t *snapshot, bool comparable, winding_resistance_t r);
 
 #endif

@@ -200,9 +200,9 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
     const uint32_t shorted = drive->task.gate_fault.switch_shorted ? (uint32_t)FAULT_GATE : 0U; /* found last step */
     const phase_currents_t phases = {measure_phases(snapshot->sample.i_ab, snapshot->sample.zero_q28),
                                      in_phases(drive->task.i_ref, snapshot->sample.theta_e)};
-    const bool is_window_new = !snapshot->mrai_is_chosen && snapshot->window.acting && snapshot->sample.acting;
-    const bool acting = !is_compensation_new(drive) && is_window_new &&
-                        !is_fast(turns_of_step_q60(drive, snapshot->sample.point.omega));
+    const bool comparable = !is_compensation_new(drive) && !snapshot->mrai_is_chosen && snapshot->window.acting &&
+                            snapshot->sample.acting;
+    const bool acting = comparable && !is_fast(turns_of_step_q60(drive, snapshot->sample.point.omega));
     const q15_t u_behind = torque_monitor_missing_voltage(snapshot->lag, drive->task.psi_ref);
     const uint32_t of_currents = check_currents(drive, snapshot, &phases, u_behind);
     if (drive_is_moving(drive)) { /* with the angle of a movement, comparisons with the motor data have no meaning */
@@ -210,7 +210,7 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
     }
     const bool behind = u_behind > drive->motor->torque_monitor.v_lag;
     const winding_resistance_t r = torque_monitor_resistance(&drive->motor->torque_monitor, snapshot->winding_dC);
-    uint32_t faults = of_currents | shorted | common_gain_step(drive, snapshot, is_window_new, r);
+    uint32_t faults = of_currents | shorted | common_gain_step(drive, snapshot, comparable, r);
     faults |= check_torque(drive, snapshot, r);
     faults |= check_angle(drive, snapshot, phases.reference, acting, behind);
     faults |= check_launch(drive, snapshot, acting, behind, r);

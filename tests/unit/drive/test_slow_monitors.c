@@ -327,6 +327,18 @@ void test_up_to_a_quarter_of_a_turn_in_a_step_the_angles_are_compared(void)
     TEST_ASSERT_FALSE(is_angle_compared(1U << 28, -(1 << 30) - 1));
 }
 
+/* It changes the residual of the voltages along the current, as a jump of the gain would. */
+void test_a_new_compensation_begins_the_comparison_of_the_gain_anew(void)
+{
+    steps(seam.motor.torque_monitor.settle_steps + 3);
+    TEST_ASSERT_GREATER_THAN_UINT8(0, drive.task.gain_jump.steps);
+    drive.parameters.modulate.dead_time_q16++;
+    step();
+    TEST_ASSERT_EQUAL_UINT8(0, drive.task.gain_jump.steps);
+    step();
+    TEST_ASSERT_EQUAL_UINT8(1, drive.task.gain_jump.steps);
+}
+
 void test_without_a_complete_window_no_angle_is_compared(void)
 {
     for (int k = 0; k < 4; k++) {
