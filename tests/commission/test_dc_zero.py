@@ -50,7 +50,7 @@ def test_the_offset_of_a_hidden_machine(name: str, seed: int, unknown: Motor, kn
     assert not found.unknown
     error = dc_zero_error(found, truth)
     print(f"{name} {seed}: {truth.plant['vdc_offset_V']:+.3f} V, error {100 * error:+.4f} %, {found.how}")
-    assert abs(truth.plant["vdc_offset_V"]) > 5.0 * STEPS["dc_zero"] * 0.1 * known.v_dc_full_scale_V
+    assert abs(truth.plant["vdc_offset_V"]) > STEPS["dc_zero"] * known.v_dc_full_scale_V  # 0 V would fail
     assert abs(error) <= STEPS["dc_zero"]
     assert abs(found.value_V - truth.plant["vdc_offset_V"]) <= 4.0 * found.sigma_V
     assert drive.get("vdc_V") > 300.0  # the others have their battery
@@ -81,11 +81,10 @@ def test_the_machines_are_what_they_were_without_it(
     assert {name for name in plant if plant[name] != before.get(name)} == {"vdc_offset_V", "vdc_least_V"}
 
 
-@pytest.mark.parametrize("offset_V", [0.5, 20.0])
-def test_a_discharged_link_shows_the_offset(offset_V: float, known: Nameplate) -> None:
-    noise_V = np.random.default_rng(5).normal(0.0, 0.4, len(TIMES))
-    found_V, sigma_V = settled(shown(offset_V + noise_V, known), known) if offset_V > 2.0 else settled(
-        shown(np.full(len(TIMES), offset_V), known), known)  # fmt: skip
+@pytest.mark.parametrize(("offset_V", "noise_V"), [(0.5, 0.0), (20.0, 0.4)])
+def test_a_discharged_link_shows_the_offset(offset_V: float, noise_V: float, known: Nameplate) -> None:
+    noise = np.random.default_rng(5).normal(0.0, noise_V, len(TIMES))
+    found_V, sigma_V = settled(shown(offset_V + noise, known), known)
     assert abs(found_V - offset_V) <= 2.0 * sigma_V <= 0.2
 
 
@@ -151,6 +150,7 @@ class Link(SoftwareInTheLoop):
     [
         ("", 1.0, exponential(350.0, 5.0, 1.0), 1.0, "as its discharge confirms"),
         ("", 1.0, np.zeros(1), 1.0, "a charge that it loses slowly is not excluded"),
+        ("", 8.0, np.zeros(1), None, "V with its contactor open, which may be a charge; "),
         ("", 6.0, exponential(350.0, 5.0, 1.0), 1.0, "discharged it still had 5"),  # lost within minutes
         ("", 60.0, exponential(350.0, 5.0, 1.0), 1.0, "end of the dc link's discharge"),
         ("state fault", 1.0, np.zeros(1), None, "state fault; "),

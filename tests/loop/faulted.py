@@ -51,6 +51,13 @@ def inject(
     motor: Motor, rpm: float, torque_Nm: float, fault: dict[str, float], seconds: float, **plant: float
 ) -> Outcome:
     """Inject `fault` in steady state at an imposed speed; `plant` are parameters of the plant from the start."""
+    return inject_slowly(motor, rpm, torque_Nm, fault, 0.0, seconds, **plant)
+
+
+def inject_slowly(
+    motor: Motor, rpm: float, torque_Nm: float, fault: dict[str, float], drift_s: float, seconds: float, **plant: float
+) -> Outcome:
+    """inject(), but each value of `fault` takes this time to change linearly."""
     parameters = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": rpm * RPM} | plant
     with Loop(motor.library, parameters, motor.flux_map) as loop:
         loop.record(("truth.torque_mean_Nm", "fault_word"))
@@ -59,8 +66,10 @@ def inject(
         loop.run(round(0.05 / loop.period_s), {"torque_requested_Nm": (0.0, torque_Nm)})
         healthy = loop.run_s(0.08)
         assert healthy[-1, 1] == 0.0, "a fault before the fault"
+        drift = {f"plant.{name}": (loop.get(f"plant.{name}"), value) for name, value in fault.items()}
+        drifting = loop.run(round(drift_s / loop.period_s), drift) if drift_s else healthy[:0]
         for name, value in fault.items():
             loop.set(f"plant.{name}", value)
-        rows = loop.run_s(seconds)
+        rows = np.vstack([drifting, loop.run_s(seconds)])
         before = float(healthy[-len(healthy) // 2 :, 0].mean())
         return outcome(rows[:, 0], rows[:, 1], before, 1000.0 * loop.period_s)

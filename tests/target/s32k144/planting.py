@@ -2,8 +2,8 @@
 """Images that differ from a built image in some source files: with a planted error, or with another machine's data.
 
 Each changed file is compiled by the build's own command and linked in place of the original. Link-time optimisation
-takes several seconds per image; an image with a planted error does without it, and the same image without the error
-must pass the check, so that what the check finds is the error.
+takes several seconds per image. An image with a planted error does without it unless its error is one of time; the same
+image without the error must then pass the check, so that what the check finds is the error.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def relinked(built: Path, replacements: dict[Path, Path], folder: Path, *, as_bu
         command = command.replace(built_object, new_object).replace(f"-c {original}", f"-c {source}{options}")
         _run(shlex.split(command), built.parent)
         link = link.replace(built_object, new_object)
-    link = link.replace("-o fluxtrue.elf", f"-o {elf}{options}").replace("fluxtrue.map", f"{folder.name}.map")
+    link = link.replace("-o fluxtrue.elf", f"-o {elf}{options}").replace(f"{built.parent}/fluxtrue.map", f"{folder}/relinked.map")
     _run(shlex.split(link), built.parent)
     image.seal(elf)
     return elf
@@ -95,7 +95,11 @@ def with_error(error: PlantedError, folder: Path) -> dict[Path, Path]:
 
 def image_with_error(built: Path, errors: Iterable[PlantedError], folder: Path, *, as_built: bool = False) -> Path:
     """The image `built` with the planted errors, sealed; without link-time optimisation unless `as_built`."""
-    sources = {old: new for error in errors for old, new in with_error(error, folder).items()}
+    sources: dict[Path, Path] = {}
+    for error in errors:
+        changed = with_error(error, folder)
+        assert sources.keys().isdisjoint(changed), "each error replaces a whole file: two in one file are not possible"
+        sources |= changed
     return relinked(built, sources, folder, as_built=as_built)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from fluxtrue_tools import faults
 from fluxtrue_tools.a2l.elf import Description, Value
 from fluxtrue_tools.commission.bus_line import RUNNING, Line, Movement
-from fluxtrue_tools.commission.drive import DONE, FAILED, LIGHTNESS, PERIODS_MAX, PULSE, SEEN_S, nothing
+from fluxtrue_tools.commission.drive import DONE, FAILED, LIGHTNESS, PERIODS_MAX, PULSE, SEEN_S, nothing, voltage_share
 from fluxtrue_tools.commission.nameplate import BRAKE_SHARE, Nameplate
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
@@ -181,10 +181,13 @@ class OverTheBus:
         if name == "theta_e_rad":
             return float(np.angle(np.exp(1j * self.capture((name,), ANGLE_PERIODS)[:, 0]).mean()))
         if name == "compensation_V":
-            return self.get("dead_time_compensation") * self._level_share * (self.get("v_dc_V") - self.dc_zero_V)
+            return self.get("dead_time_compensation") * self._level_share * self.get("v_dc_V") * self._voltage_share()
         if name == "compensation_knee_A":
             return self._known.knee_A
         return self._read(self._known_value(name))
+
+    def _voltage_share(self) -> float:
+        return voltage_share(self.dc_zero_V, self.get("v_dc_V")) if self.dc_zero_V else 1.0
 
     def _known_value(self, name: str) -> Value:
         if name not in self._values:
@@ -410,7 +413,7 @@ class OverTheBus:
             raise FluxtrueError(f"commission: {capture.warning}")
         if not self.dc_zero_V:
             return capture.columns
-        share = 1.0 - self.dc_zero_V / self.get("v_dc_V")
+        share = self._voltage_share()
         return {name: share * column if name in VOLTAGES else column for name, column in capture.columns.items()}
 
     @staticmethod

@@ -21,6 +21,7 @@ SEEN_S = 1.0  # of a discharged link
 STEADY = 2.5e-4  # of the full scale: change of the reading in SEEN_S, and what a fall leaves of an exponential, at most
 AT_ZERO = 0.02  # share of the readings that may be zero
 CERTAIN = 5e-4  # of the full scale: standard deviation of the value to which a fall goes
+UNCONFIRMED = 5e-3  # of the full scale: largest offset without a discharge that confirms it; it raises the trip
 SIGMAS = 4.0  # of the noise, for a change that is not noise
 SAME = 1e-3  # of the full scale: between both measurements
 RESTING, FALLEN = "contactor open, dc link discharged", "end of the dc link's discharge"
@@ -135,7 +136,10 @@ def _found(drive: Capture, known: Nameplate) -> tuple[float, float, str]:
             raise UnclearError(f"{first}; {second}") from second
     try:
         fallen = falling(drive.falling_link_V(), known)
-    except UnclearError:
+    except UnclearError as why:
+        if at_rest[0] > UNCONFIRMED * known.v_dc_full_scale_V:
+            raise UnclearError(f"the dc link shows {at_rest[0]:.3g} V with its contactor open, which may be a charge; "
+                               f"{why}") from why  # fmt: skip
         return *at_rest, f"{RESTING}; a charge that it loses slowly is not excluded"
     return _agreed(at_rest, fallen, known)
 

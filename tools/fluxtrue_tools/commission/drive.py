@@ -32,6 +32,12 @@ LINK_EMPTY_S, LINK_FALLS_S = 0.3, 0.1
 CONNECTION = ("angle_pole_pairs", "angle_reversed", "angle_offset_rad", "angle_imposed")
 
 
+def voltage_share(dc_zero_V: float, shown_V: float) -> float:
+    """Of a voltage that the drive has computed with the dc voltage that its sensor shows, which the inverter makes of it
+    (CM-48). dc_zero_V: the sensor's offset, of which the drive does not know."""
+    return 1.0 - dc_zero_V / shown_V if dc_zero_V else 1.0
+
+
 def nothing(_: float) -> None:
     """The time that has passed is not shown."""
 
@@ -46,8 +52,9 @@ class Capture(Protocol):
     brake_s: float  # of a current that brakes the rotor
     lightness: float  # of the rotor, as a multiple of the guess: what the braking currents have shown
     strikes: bool  # a heavy rotor is braked by pulses
-    dc_zero_V: float  # what the dc voltage's sensor shows without voltage, beyond what the firmware subtracts; voltages
-    # are taken and given without it
+    # What the dc voltage's sensor shows without voltage, beyond what the firmware subtracts; captured voltages and
+    # compensation_V are corrected for it.
+    dc_zero_V: float
     struck: float  # change of the speed by a half wave of pulses over the square of its bound, rpm/A^2; 0: not known
 
     @property
@@ -140,8 +147,7 @@ class SoftwareInTheLoop:
         return value * self._voltage_share() if name == "compensation_V" else value
 
     def _voltage_share(self) -> float:
-        """Of a voltage that the drive has computed, which the inverter makes of it."""
-        return 1.0 - self.dc_zero_V / self._loop.get("vdc_V") if self.dc_zero_V else 1.0
+        return voltage_share(self.dc_zero_V, self._loop.get("vdc_V"))
 
     def capture(self, names: Sequence[str], periods: int) -> Array:
         """Every period, by reading the names after it."""
@@ -194,7 +200,7 @@ class SoftwareInTheLoop:
         self.set("iq_ref_A", 0.0)
         self.set("current_mode", 0.0)
 
-    # The dc link is measured on a drive of its own, before it is switched on: the noise of the others stays what it is.
+    # The dc link is measured on a second simulation, so that the noise of the other steps does not change.
 
     def _link_V(self, seconds: float) -> Array:
         assert self._link is not None
