@@ -71,7 +71,9 @@ def relinked(built: Path, replacements: dict[Path, Path], folder: Path, *, as_bu
         command = command.replace(built_object, new_object).replace(f"-c {original}", f"-c {source}{options}")
         _run(shlex.split(command), built.parent)
         link = link.replace(built_object, new_object)
-    link = link.replace("-o fluxtrue.elf", f"-o {elf}{options}").replace(f"{built.parent}/fluxtrue.map", f"{folder}/relinked.map")
+    link = link.replace("-o fluxtrue.elf", f"-o {elf}{options}").replace(
+        f"{built.parent}/fluxtrue.map", f"{folder}/relinked.map"
+    )
     _run(shlex.split(link), built.parent)
     image.seal(elf)
     return elf

@@ -33,8 +33,8 @@ CONNECTION = ("angle_pole_pairs", "angle_reversed", "angle_offset_rad", "angle_i
 
 
 def voltage_share(dc_zero_V: float, shown_V: float) -> float:
-    """Of a voltage that the drive has computed with the dc voltage that its sensor shows, which the inverter makes of it
-    (CM-48). dc_zero_V: the sensor's offset, of which the drive does not know."""
+    """Of a voltage that the drive has computed with the dc voltage that its sensor shows, which the inverter makes of
+    it (CM-48). dc_zero_V: the sensor's offset, of which the drive does not know."""
     return 1.0 - dc_zero_V / shown_V if dc_zero_V else 1.0
 
 
