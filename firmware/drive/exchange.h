@@ -7,7 +7,7 @@
  *   From task to ISR, the writer cannot interrupt the reader: one read is enough.
  *   From fast ISR to task, it can: the task copies all it needs, and repeats the copy if a period has interrupted it.
  *   Who needs nothing but one sample reads it in place, because its slot is written again only 64 periods later.
- *   The paper's identification has a box of its own (drive/mrai).
+ *   The paper's identification has a box of its own for its gains (drive/mrai); it reads points in that of the samples.
  * Source   docs/architecture.md, shared data; one core, the writer always completes before a lower priority resumes
  * Units    per unit of motor.bases; angles in turns times 2^32
  * Range    a generation wraps after 2^32 periods or steps; only differences and remainders are used

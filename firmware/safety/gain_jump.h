@@ -29,7 +29,8 @@ typedef struct {
 } gain_jump_in_t;
 
 typedef struct {
-    dq_q15_t change_x16;     /* mean residual over 16 steps, times 16; from a candidate on, without 16 residuals */
+    /* Mean residual over 16 steps, times 16; from the 7th step after a candidate on each residual is subtracted. */
+    dq_q15_t change_x16;
     dq_q15_halfword_t i_ref; /* means over 16 steps of reference and speed before */
     q15_t omega;
     uint8_t steps;

@@ -31,9 +31,9 @@
 
 typedef struct {
     q31_t deviation;
-    dq_q15_t psi;               /* of the last step, */
-    dq_q15_halfword_t residual; /* e, 0 while it is not known, */
-    q15_t omega;                /* tracked */
+    dq_q15_t psi;               /* of the last step */
+    dq_q15_halfword_t residual; /* e of the last step, 0 while it is not known */
+    q15_t omega;                /* tracked, of the last step */
     uint8_t torque, angle, settling;
 } torque_monitor_state_t;
 

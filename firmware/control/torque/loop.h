@@ -13,7 +13,7 @@
  * Source   docs/theory/torque-loop.md (TL-3) ... (TL-9)
  * Units    per unit of T_b; x is a ratio
  * Range    authority (0, 1); |T*| < 1; the relative error e / max(|T*|, T_min) is limited to 1
- * Rounding half up: 1/2 LSB q31 per step in x, 1/2 LSB q15 in r
+ * Rounding half up: 1/2 LSB q31 per step in x, 1/2 LSB q15 in r; at a limit the decay of x up to 1 LSB downwards
  * Errors   saturates at the authority and reports it in saturated
  * Context  1 kHz task; one bounded division */
 #include <stdbool.h>

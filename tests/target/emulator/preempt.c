@@ -176,7 +176,8 @@ static void allowed_compute(preempt_t *p)
     p->outcome[OLD] = victim_on_host(p, &p->before);
     drive_t after = interrupts_on_host(p, &p->before);
     if (p->victim == PREEMPT_MRAI) {
-        after.mrai.isr = p->before.mrai.isr; /* only the mailbox is an input of this victim */
+        /* Of what the interrupts write, only the mailbox and the ring of the samples are inputs of this victim. */
+        after.mrai.isr = p->before.mrai.isr;
         after.psi_d_error = p->before.psi_d_error;
         after.fast = p->before.fast;
     }
