@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every sensible motor is accepted as it is, and its numbers keep their range.
 
-FLUXTRUE_MOTORS=1000 draws a thousand motors in place of 250."""
+FLUXTRUE_MOTORS=1000 draws a thousand motors in place of 125."""
 
 import math
 import os
@@ -21,7 +21,7 @@ from fluxtrue_tools.motor.config import load_config
 from fluxtrue_tools.motor.flux_tables import OBSERVER_M_MAX
 from fluxtrue_tools.motor.motor import Motor, load_motor
 
-SEED, PART, ACCEPTED = 12, 250, 0.99
+SEED, PART, ACCEPTED = 12, 125, 0.99
 PARTS = max(int(os.environ.get("FLUXTRUE_MOTORS", PART)) // PART, 1)
 COUNTS = carriers(standard())
 TESTED = Path(__file__).resolve().parents[2] / "motors"
