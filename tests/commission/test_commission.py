@@ -12,7 +12,6 @@ from watched import Watched
 from fluxtrue_tools.cli import run as command
 from fluxtrue_tools.commission import hidden
 from fluxtrue_tools.commission.bursts import MOVED
-from fluxtrue_tools.commission.drive import SoftwareInTheLoop
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.proof import STEPS
 from fluxtrue_tools.commission.score import (
@@ -47,8 +46,7 @@ R_LEFT, LEG_V = 0.004, 0.05  # beyond the sensors' gains; 5 mV of 1.2 V; a half 
 @pytest.mark.parametrize(("name", "seed", "changed"), MACHINES)
 def test_map_and_resistance_of_a_hidden_machine(name: str, seed: int, changed: dict[str, float], unknown: Motor,
                                                 known: Nameplate) -> None:  # fmt: skip
-    truth, flux_map, plant = hidden.draw(name, seed, unknown, known.i_max_A)
-    drive = SoftwareInTheLoop(Loop(unknown.library, plant | changed, flux_map))
+    drive, truth = hidden.make(name, seed, unknown, known.i_max_A, changed=changed)
     found = run(drive, chosen(("map",)), known, lambda _: None)
     assert found.surface is not None and found.resistance is not None and found.balance is not None
     reached = score(found.surface.model, truth, known.i_max_A, truth.psi_f_Vs)
@@ -88,10 +86,9 @@ def test_noise_does_not_choose_the_map(name: str, seed: int, number: int, unknow
     """With weights that grow towards small currents, where a sample's error is largest, the score of the smoothing is
     flat, the noise chooses among its candidates, and the first three maps are wrong by 0.76 to 0.78 %. Without the
     common errors of the samples after an uncertain sign the last two are wrong by 0.76 and 0.78 %."""
-    truth, flux_map, plant = hidden.draw(name, seed, unknown, known.i_max_A)
     rng = np.random.default_rng([number, 77])
     drawn = {"seed": float(rng.integers(1, 1 << 40)), "theta_m_rad": float(rng.uniform(0.0, 2.0 * np.pi))}
-    drive = SoftwareInTheLoop(Loop(unknown.library, plant | drawn, flux_map))
+    drive, truth = hidden.make(name, seed, unknown, known.i_max_A, changed=drawn)
     known = replace(known, psi_f_Vs=truth.psi_f_Vs, psi_f_source="data sheet")
     surface = run(drive, chosen(("map",)), known, lambda _: None).surface
     assert surface is not None

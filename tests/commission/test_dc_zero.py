@@ -187,8 +187,7 @@ def test_over_can_also_with_what_a_discharge_leaves(unknown: Motor, known: Namep
 @pytest.mark.parametrize("offset_V", [-OFFSET_V, OFFSET_V])
 def test_the_later_steps_take_it_away(offset_V: float, unknown: Motor, known: Nameplate) -> None:
     """5 % of the dc voltage: without it the resistance would be as wrong."""
-    truth, flux_map, plant = hidden.draw("saturated", 12, unknown, known.i_max_A)
-    drive = SoftwareInTheLoop(Loop(unknown.library, plant | {"vdc_offset_V": offset_V}, flux_map))
+    drive, truth = hidden.make("saturated", 12, unknown, known.i_max_A, changed={"vdc_offset_V": offset_V})
     found = run(drive, chosen(("resistance",)), known, lambda _: None)
     assert found.resistance is not None
     _, left = resistance_error(found.resistance.r_ohm, truth)

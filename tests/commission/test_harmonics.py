@@ -17,7 +17,6 @@ from fluxtrue_tools.commission.score import harmonics_deg, waves_rad
 from fluxtrue_tools.commission.steps import Found, chosen, run
 from fluxtrue_tools.motor.flux_model import Array
 from fluxtrue_tools.scope.xcp import XcpRefused
-from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
 
 PERIOD_S, WINDOW_S, BITS = 1e-4, 0.2, 14
@@ -119,10 +118,8 @@ def test_windows_of_less_than_seven_tenths_of_a_turn_are_not_evaluated() -> None
 
 def spun(unknown: Motor, known: Nameplate, name: str, seed: int, **changes: float) -> tuple[spin.Spun, hidden.Truth]:
     """The hidden machine after the step, with these parameters."""
-    truth, flux_map, plant = hidden.draw(name, seed, unknown, known.i_max_A, connected=False)
-    plant.update(changes)
-    found = run(hidden.SoftwareInTheLoop(Loop(unknown.library, plant, flux_map)), chosen(("spin",)), known,
-                lambda _: None).spun  # fmt: skip
+    drive, truth = hidden.make(name, seed, unknown, known.i_max_A, connected=False, changed=changes)
+    found = run(drive, chosen(("spin",)), known, lambda _: None).spun
     assert found is not None and found.harmonics is not None
     return found, truth
 

@@ -15,7 +15,6 @@ from fluxtrue_tools.commission.score import turned
 from fluxtrue_tools.commission.steps import chosen, run
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
-from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
 
 # pmasynrm 322 slows down so fast that its current never settles without more of it along q. With errors of other kinds
@@ -49,8 +48,8 @@ def test_an_unknown_connection_magnet_inertia_and_drag(
 
 def changed(unknown: Motor, known: Nameplate, **plant: float) -> SoftwareInTheLoop:
     """A hidden machine with a defect."""
-    _, flux_map, parameters = hidden.draw("saturated", 101, unknown, known.i_max_A, connected=False)
-    return SoftwareInTheLoop(Loop(unknown.library, parameters | plant, flux_map))
+    drive, _ = hidden.make("saturated", 101, unknown, known.i_max_A, connected=False, changed=plant)
+    return drive
 
 
 @pytest.mark.parametrize(

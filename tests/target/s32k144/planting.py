@@ -9,6 +9,7 @@ image without the error must then pass the check, so that what the check finds i
 from __future__ import annotations
 
 import atexit
+import functools
 import shlex
 import shutil
 import subprocess
@@ -105,18 +106,21 @@ def image_with_error(built: Path, errors: Iterable[PlantedError], folder: Path, 
     return relinked(built, sources, folder, as_built=as_built)
 
 
-_without_error: dict[Path, Path] = {}
 _passed: set[tuple[Callable[[Parts], None], Path]] = set()
+
+
+@functools.cache
+def _image_without_error(built: Path) -> Path:
+    """The image that is linked like those with a planted error."""
+    folder = Path(tempfile.mkdtemp(prefix="relinked"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return relinked(built, {}, folder, as_built=False)
 
 
 def assert_passes_without_error(check: Callable[[Parts], None], parts: Parts) -> None:
     """The check passes on the image that is linked like those with a planted error. It runs once for each image."""
     if (check, parts.image) not in _passed:
-        if parts.image not in _without_error:
-            folder = Path(tempfile.mkdtemp(prefix="relinked"))
-            atexit.register(shutil.rmtree, folder, ignore_errors=True)
-            _without_error[parts.image] = relinked(parts.image, {}, folder, as_built=False)
-        check(replace(parts, image=_without_error[parts.image]))
+        check(replace(parts, image=_image_without_error(parts.image)))
         _passed.add((check, parts.image))
 
 

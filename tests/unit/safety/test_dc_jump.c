@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "counted.h"
 #include "unity.h"
 
 /* r = 0.0137, psi_f = 0.44, 10 N·m = 0.034, 7 V = 0.013, 10 A = 0.025: about those of hsm1. */
@@ -12,7 +13,7 @@ static dc_jump_config_t config;
 static dc_jump_state_t state;
 static dc_jump_in_t in;
 
-enum { STEADY = 4, FREE = 3, FOUND = 8, NEVER = 0, V_DC = 20000 };
+enum { STEADY = 4, FREE = 3, FOUND = 8, V_DC = 20000 };
 
 static int32_t q15(double x)
 {
@@ -40,20 +41,13 @@ static bool step(void)
 
 static void drive(int steps)
 {
-    for (int n = 0; n < steps; n++) {
-        TEST_ASSERT_FALSE(step());
-    }
+    run_without_finding(step, steps);
 }
 
 /* The step after the jump in which the sensor is found. */
 static int found_in(int steps)
 {
-    for (int n = 1; n <= steps; n++) {
-        if (step()) {
-            return n;
-        }
-    }
-    return NEVER;
+    return found_in_step(step, steps);
 }
 
 /* The computed voltage and the measured one become so many times as large. */

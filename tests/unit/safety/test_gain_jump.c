@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "counted.h"
 #include "unity.h"
 
 /* 7 V = 0.013, 10 A = 0.025: about those of hsm1. */
@@ -12,7 +13,7 @@ static gain_jump_state_t state;
 static gain_jump_in_t in;
 static dq_q15_t residual, i_ref, i_mean, per_quarter; /* of this step */
 
-enum { SETTLED = 33, DECIDED = 23, NEVER = 0 };
+enum { SETTLED = 33, DECIDED = 23 };
 
 static int32_t q15(double x)
 {
@@ -52,19 +53,12 @@ static bool step(void)
 
 static void drive(int steps)
 {
-    for (int n = 0; n < steps; n++) {
-        TEST_ASSERT_FALSE(step());
-    }
+    run_without_finding(step, steps);
 }
 
 static int found_in(int steps)
 {
-    for (int n = 1; n <= steps; n++) {
-        if (step()) {
-            return n;
-        }
-    }
-    return NEVER;
+    return found_in_step(step, steps);
 }
 
 /* In one step the mean current is off its reference by this share of it. */

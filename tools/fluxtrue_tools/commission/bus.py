@@ -19,7 +19,17 @@ import numpy as np
 from fluxtrue_tools import faults
 from fluxtrue_tools.a2l.elf import Description, Value
 from fluxtrue_tools.commission.bus_line import RUNNING, Line, Movement
-from fluxtrue_tools.commission.drive import DONE, FAILED, LIGHTNESS, PERIODS_MAX, PULSE, SEEN_S, nothing, voltage_share
+from fluxtrue_tools.commission.drive import (
+    DONE,
+    FAILED,
+    LIGHTNESS,
+    PERIODS_MAX,
+    PULSE,
+    SEEN_S,
+    VOLTAGES,
+    nothing,
+    voltage_share,
+)
 from fluxtrue_tools.commission.nameplate import BRAKE_SHARE, Nameplate
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
@@ -35,7 +45,7 @@ UNKNOWN: Final = 0x20
 Q15: Final = 32768.0
 CAPTURED: Final = {"id_A": "i_d_A", "iq_A": "i_q_A", "ud_V": "u_d_V", "uq_V": "u_q_V", "theta_e_rad": "theta_e_deg",
                    "i_zero_A": "i_zero_A", "sensor_turns": "theta_m_deg", "v_dc_V": "v_dc_V"}  # fmt: skip
-VOLTAGES: Final = ("u_d_V", "u_q_V")  # which the drive has computed with the dc voltage that its sensor shows
+CAPTURED_VOLTAGES: Final = tuple(CAPTURED[name] for name in VOLTAGES)
 LINK_S, LINK_SAMPLES, LINK_FALLS_S = 6.0, 1000, 5.0  # until the dc link is off; of a capture; the firmware's limit
 PULSE_SIGNALS: Final = ("id_A", "iq_A", "ud_V", "uq_V", "theta_e_rad", "i_zero_A")
 FORMATS: Final = {"S16": "<h", "U32": "<I", "F32": "<f", "U8": "<B"}
@@ -187,6 +197,7 @@ class OverTheBus:
         return self._read(self._known_value(name))
 
     def _voltage_share(self) -> float:
+        """Without an offset, without reading the dc voltage over the bus."""
         return voltage_share(self.dc_zero_V, self.get("v_dc_V")) if self.dc_zero_V else 1.0
 
     def _known_value(self, name: str) -> Value:
@@ -411,10 +422,10 @@ class OverTheBus:
         capture = self._scope.read(most=most)
         if capture.warning:
             raise FluxtrueError(f"commission: {capture.warning}")
-        if not self.dc_zero_V:
-            return capture.columns
         share = self._voltage_share()
-        return {name: share * column if name in VOLTAGES else column for name, column in capture.columns.items()}
+        return {
+            name: share * column if name in CAPTURED_VOLTAGES else column for name, column in capture.columns.items()
+        }
 
     @staticmethod
     def _column(columns: Mapping[str, Array], name: str) -> Array:

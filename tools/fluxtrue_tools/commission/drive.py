@@ -159,7 +159,7 @@ class SoftwareInTheLoop:
         rows = self._loop.run(periods)
         self.passed(periods * self.period_s)
         voltages = [n for n, name in enumerate(names) if name in VOLTAGES]
-        if voltages and self.dc_zero_V:
+        if voltages:
             rows[:, voltages] *= self._voltage_share()
         return rows
 

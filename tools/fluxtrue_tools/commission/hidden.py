@@ -6,7 +6,7 @@ the currents, and a magnet of its own. Resistance, inverter, sensors, inertia an
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -226,8 +226,16 @@ def machine_text(plant: dict[str, float], flux_map: FluxMap | None) -> str:
 
 
 def make(
-    name: str, seed: int, motor: Motor, i_max_A: float, connected: bool = True, other_errors: bool = False
+    name: str,
+    seed: int,
+    motor: Motor,
+    i_max_A: float,
+    connected: bool = True,
+    other_errors: bool = False,
+    changed: Mapping[str, float] | None = None,
 ) -> tuple[SoftwareInTheLoop, Truth]:
-    """A drive with a hidden machine at its terminals; connected: sensor and leads are as the firmware assumes."""
+    """A drive with a hidden machine at its terminals, some of its parameters changed; connected: sensor and leads are
+    as the firmware assumes."""
     truth, flux_map, plant = draw(name, seed, motor, i_max_A, connected, other_errors)
+    plant.update(changed or {})
     return SoftwareInTheLoop(Loop(motor.library, plant, flux_map)), truth
