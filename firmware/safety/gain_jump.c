@@ -26,10 +26,11 @@ static bool is_candidate(const torque_monitor_config_t *config, const gain_jump_
     return in->current > 4 * config->i_0 && along > fx_mul_q30(in->current, config->i_0) >> 2;
 }
 
-/* The means begin with the second residual, because the torque monitor may not have known the first. */
+/* The means begin with the second residual, because the torque monitor may not have known the first. Until 16 steps
+ * have passed, each step has nearly the same weight: one that is disturbed would otherwise be in the mean for long. */
 static void follow(gain_jump_state_t *state, const gain_jump_in_t *in)
 {
-    const int shift = (state->steps < 2U) ? 0 : MEAN;
+    const int shift = fx_min_s32(31 - (int)fx_leading_zeros(state->steps | 1U), MEAN);
     state->change_x16.d += (16 * in->residual.d - state->change_x16.d) >> shift;
     state->change_x16.q += (16 * in->residual.q - state->change_x16.q) >> shift;
     state->i_ref.d = approach(state->i_ref.d, (int16_t)(in->i_ref & 0xFFFFU), shift);
@@ -40,10 +41,12 @@ static void follow(gain_jump_state_t *state, const gain_jump_in_t *in)
 
 bool gain_jump_step(const torque_monitor_config_t *config, gain_jump_state_t *state, const gain_jump_in_t *in)
 {
-    if (!is_steady(config, state, in, (state->steps <= (uint8_t)SETTLED) ? BEFORE : SINCE)) {
+    const bool candidate = is_candidate(config, in);
+    const bool steady = is_steady(config, state, in, (state->steps <= (uint8_t)SETTLED) ? BEFORE : SINCE);
+    if (!steady || (candidate && state->steps < (uint8_t)SETTLED)) {
         state->steps = 0;
     }
-    if (state->steps < (uint8_t)SETTLED || (state->steps == (uint8_t)SETTLED && !is_candidate(config, in))) {
+    if (state->steps < (uint8_t)SETTLED || (state->steps == (uint8_t)SETTLED && !candidate)) {
         follow(state, in);
         return false;
     }

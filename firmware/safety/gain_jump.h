@@ -8,7 +8,7 @@
  *   The residual e - j w psi(i) of the tables at the measured current does not change with reference and speed, as far
  *   as the tables are right. Since the mean before, i* must have moved by less than 1/16 in each of the 33 steps up to
  *   the candidate and by less than a quarter until the decision, the speed by less than 1/64 and lag_noise; otherwise
- *   the comparison begins anew.
+ *   the comparison begins anew, and so it does with a candidate before the 33rd step.
  * Source   docs/theory/monitors.md (MN-58) ... (MN-61)
  * Units    per unit
  * Range    every argument
