@@ -7,7 +7,9 @@
 #include "fx/q.h"
 
 #define HALF_LSB_Q22 64
-#define V_D_MIN Q15(0.7)                     /* share of the circle that the d axis may always use (CC-11) */
+#define V_D_MIN Q15(0.7)                     /* share of the circle that the d axis may usually use (CC-11) */
+#define V_D_LEAST (127 * 128 + 64)           /* 0.498: the same while q is far from its flux; the middle of a cell */
+#define V_Q_FAR (3 << 14)                    /* v_q = 1.5, q15: the q axis is far from its flux (CC-11) */
 #define CIRCLE_SHIFT 7                       /* 256 cells of the circle's table */
 #define V_Q_LEAVES_MIN (182 * 128)           /* from here on, q15, the circle's cells leave d less than V_D_MIN */
 #define INSIDE_CIRCLE_Q30 (127 << 23)        /* |v|^2 = 127/128: below, no cell of the circle's table limits v */
@@ -119,11 +121,14 @@ static int32_t remaining_voltage(const uint16_t *circle, int32_t other)
     return circle[other >> CIRCLE_SHIFT];
 }
 
-/* The same for the d axis, at least V_D_MIN. The q voltage is compared with the first cell that leaves less, which
- * saves reading the table there. */
+/* The same for the d axis, at least V_D_MIN, or V_D_LEAST where q alone would need V_Q_FAR. The q voltage is compared
+ * with the first cell that leaves less, which saves reading the table there. */
 static int32_t remaining_for_d(const uint16_t *circle, int32_t q)
 {
-    return (q < V_Q_LEAVES_MIN) ? remaining_voltage(circle, q) : V_D_MIN;
+    if (q < V_Q_LEAVES_MIN) {
+        return remaining_voltage(circle, q);
+    }
+    return (q < V_Q_FAR) ? V_D_MIN : V_D_LEAST;
 }
 
 /* The d axis has priority while its flux is to fall and its voltage is negative, because cutting this voltage would
@@ -136,7 +141,7 @@ static dq_q15_t limit_to_circle(dq_q15_t v, int32_t error_d, int32_t turn)
     FX_ADDRESS_ONCE(circle);
     int32_t magnitude_d = fx_ones_magnitude(fx_sat_q15_word(v.d));
     if ((v.d & error_d) >= 0) {
-        magnitude_d = fx_min_s32(magnitude_d, remaining_for_d(circle, fx_ones_magnitude(fx_sat_q15_word(v.q))));
+        magnitude_d = fx_min_s32(magnitude_d, remaining_for_d(circle, fx_ones_magnitude(v.q)));
     }
     const int32_t d = with_sign_of(magnitude_d, v.d);
     const int32_t excess = fx_sat_q15_word(v.d - d);

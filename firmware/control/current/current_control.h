@@ -14,8 +14,8 @@
  *   sigma = 1/(2 T_d), T_d = 1.5 T_s
  * Voltage limit: v = u/v_max, v_max = v_ratio v_dc, is limited to the unit circle.
  *   psi_d* < psi_d and v_d < 0: the d axis has priority. Otherwise the d axis gets what v_q leaves of the circle, at
- *     least 0.7; if it had priority there, the q current could never fall, and its flux would keep the d axis at its
- *     limit.
+ *     least 0.7, or half if |v_q| >= 1.5; if it had priority there, the q current could never fall, and its flux would
+ *     keep the d axis at its limit.
  *   v_q is reduced, with the sign of w, by what v_d exceeds its bound, because only a smaller q flux gives the d axis
  *     its voltage. It then gets the rest of the circle, at least a quarter.
  * Anti-windup: while the circle limits, s also integrates a T_s (u_limited - u). The response then is that to a

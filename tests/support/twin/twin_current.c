@@ -20,12 +20,14 @@ static double remaining_voltage(double x)
 }
 
 /* The voltage circle. While the d flux must fall and v_d is negative, the d axis has priority; otherwise d gets what q
- * leaves, at least 0.7 of the radius. What d lacks is subtracted from q, which gets the rest. */
+ * leaves, at least 0.7 of the radius, or 0.5 if q alone would need 1.5. What d lacks is subtracted from q, which gets
+ * the rest. */
 static twin_dq_t circle(twin_dq_t u, double u_max, bool less_flux, double omega)
 {
     const twin_dq_t v = {u.d / u_max, u.q / u_max};
     const bool d_first = less_flux && v.d < 0.0;
-    const double d_max = d_first ? 1.0 : fmax(remaining_voltage(twin_clamp(v.q, -1.0, 1.0)), 0.7);
+    const double d_least = (fabs(v.q) < 1.5) ? 0.7 : 127.5 / 256.0;
+    const double d_max = d_first ? 1.0 : fmax(remaining_voltage(twin_clamp(v.q, -1.0, 1.0)), d_least);
     const double d = twin_clamp(v.d, -d_max, d_max);
     const double missing = twin_clamp(v.d - d, -1.0, 1.0);
     const double left = remaining_voltage(d);

@@ -297,8 +297,9 @@ void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
         twin_current_state_t twin = {{2.0 * from_q31(state.s_d_q30) * f.v, 2.0 * from_q31(state.s_q_q30) * f.v}, false};
         const dq_q15_t u = step();
         const twin_dq_t t = twin_step(&twin);
-        const bool q_chooses_step = (target.psi.d >= psi.d || t.d > 0.0) &&
-                                    between_steps(out.u.q / v_max(), 0.5 / v_max());
+        const double v_q = out.u.q / v_max();
+        const bool between = between_steps(v_q, 0.5 / v_max()) || fabs(fabs(v_q) - 1.5) < 1.0 / v_max();
+        const bool q_chooses_step = (target.psi.d >= psi.d || t.d > 0.0) && between;
         if ((limited || twin.limited) && (q_chooses_step || between_steps(t.d / v_max(), 0.0))) {
             continue;
         }
@@ -454,7 +455,7 @@ void test_while_the_d_flux_is_to_fall_a_positive_d_voltage_gives_way(void)
     target.psi.d = (q15_t)(target.psi.d - 1);
     target.turn = 1;
     state.s_d_q30 = (int32_t)(v_max() * 9 / 10) * 32768;
-    state.s_q_q30 = (1 << 30) - 1;
+    state.s_q_q30 = (int32_t)v_max() * 32768;
     const dq_q15_t u = step();
     TEST_ASSERT_INT_WITHIN(1, 0.7 * v_max(), u.d);
     TEST_ASSERT_INT_WITHIN(2, 0.7111 * v_max(), u.q);
@@ -488,10 +489,26 @@ void test_while_the_d_flux_is_to_rise_the_q_axis_has_priority(void)
     TEST_ASSERT_INT_WITHIN(3, (0.6 - 0.0012) * v_max(), u.q);
     TEST_ASSERT_TRUE(limited);
     state.s_d_q30 = (int32_t)(v_max() * 3 / 4) * 32768;
-    state.s_q_q30 = -(1 << 30);
+    state.s_q_q30 = -(int32_t)(v_max() * 5 / 4) * 32768;
     u = step();
     TEST_ASSERT_INT_WITHIN(1, 0.7 * v_max(), u.d);
     TEST_ASSERT_INT_WITHIN(2, -0.7111 * v_max(), u.q);
+}
+
+/* By hand: 1.5 of the circle for q and 0.75 for d. Just below, d keeps 0.7; from there on 127.5/256 = 0.498, whose
+ * cell of the circle leaves sqrt(1 - (128/256)^2) = 0.866. */
+void test_a_q_axis_far_from_its_flux_leaves_the_d_axis_half_of_the_circle(void)
+{
+    target.psi.d = (q15_t)(target.psi.d + 1);
+    for (int sign = -1; sign <= 1; sign += 2) {
+        for (int far = 0; far <= 1; far++) {
+            const double q = (far != 0) ? 1.5 * v_max() + 2.0 : 1.5 * v_max() - 2.0;
+            state = (current_control_state_t){(int32_t)(v_max() * 3 / 4) * 32768, sign * (int32_t)(q * 32768.0)};
+            const dq_q15_t u = step();
+            TEST_ASSERT_INT_WITHIN(1, ((far != 0) ? 127.5 / 256.0 : 0.7) * v_max(), u.d);
+            TEST_ASSERT_INT_WITHIN(2, sign * ((far != 0) ? 0.866 : 0.7111) * v_max(), u.q);
+        }
+    }
 }
 
 /* By hand: the d flux is to rise, and v_d exceeds by 200 LSB the circle, all of which v_q = 0 leaves it: q gets these
