@@ -19,11 +19,18 @@ static int32_t short_circuit_i_d(const drive_t *drive, const snapshot_t *snapsho
     return high;
 }
 
+bool switch_off_may_switch(const drive_t *drive, const snapshot_t *snapshot)
+{
+    const bool has_angle = snapshot->angle_absolute || drive_imposes_angle(drive);
+    return !drive->held && has_angle && !drive_has_ended_movement(drive);
+}
+
 /* Whether the currents are controlled at a speed at which disabled switching would rectify. */
-static bool controls_at_speed(const drive_t *drive, run_state_t wanted)
+static bool controls_at_speed(const drive_t *drive, const snapshot_t *snapshot, run_state_t wanted)
 {
     const task_state_t *task = &drive->task;
-    return task->run_state == RUN_STATE_RUN && wanted != RUN_STATE_FAULT && task->safe_state.rectifies &&
+    const bool begins = drive->request.may_hold && switch_off_may_switch(drive, snapshot);
+    return (task->run_state == RUN_STATE_RUN || begins) && wanted != RUN_STATE_FAULT && task->safe_state.rectifies &&
            !drive_bypasses_torque_path(drive);
 }
 
@@ -31,7 +38,7 @@ run_state_t switch_off_step(drive_t *drive, const snapshot_t *snapshot, run_stat
 {
     task_state_t *task = &drive->task;
     switch_off_t *off = &task->switch_off;
-    const bool controls = controls_at_speed(drive, wanted);
+    const bool controls = controls_at_speed(drive, snapshot, wanted);
     off->holds = controls && wanted == RUN_STATE_OFF && *faults == 0U; /* (SS-12) */
     const bool shorts = controls && task->safe_state.short_circuit;
     const bool moves = shorts && *faults != 0U && (*faults & ~FAULTS_CONTROLLED) == 0U;

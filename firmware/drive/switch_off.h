@@ -3,7 +3,7 @@
 #define DRIVE_SWITCH_OFF_H
 /** Leaving torque where disabled switching would rectify.
  *   Enable off: the torque goes to zero at the fastest slew rate, and the current control holds it there until
- *     switching can be disabled. The currents are those of field weakening without torque: far below those of the short
+ *     switching can be disabled. It begins to, where the speed is reached with enable off and request.may_hold. The currents are those of field weakening without torque: far below those of the short
  *     circuit, which some machines cannot withstand.
  *   Over-temperature and over-speed leave current control intact, but latching the fault ends it. Before the fault is
  *     latched, i* moves in 8 steps to the steady current of the short circuit, psi_d(i_d, 0) + dpsi = 0 and i_q = 0,
@@ -16,6 +16,8 @@
  * Context  1 kHz task; no division */
 #include "drive/drive.h"
 
+/** Whether the bridge may switch: the angle is known, the background does not hold the drive, no movement has ended. */
+bool switch_off_may_switch(const drive_t *drive, const snapshot_t *snapshot);
 /** The run state of this step. It stays RUN while the torque is held at zero, and while the currents are being moved to
  * those of the short circuit; in the latter case *faults becomes 0. */
 run_state_t switch_off_step(drive_t *drive, const snapshot_t *snapshot, run_state_t wanted, uint32_t *faults);

@@ -40,9 +40,7 @@ static run_state_t next_run_state(drive_t *drive, const snapshot_t *snapshot)
     if (snapshot->faults != 0U) {
         return RUN_STATE_FAULT;
     }
-    const bool has_angle = snapshot->angle_absolute || drive_imposes_angle(drive);
-    const bool may_run = !drive->held && has_angle && !drive_has_ended_movement(drive);
-    return (enable && may_run) ? RUN_STATE_RUN : RUN_STATE_OFF;
+    return (enable && switch_off_may_switch(drive, snapshot)) ? RUN_STATE_RUN : RUN_STATE_OFF;
 }
 
 /* Compares the acting voltage with the plan of the last step. */

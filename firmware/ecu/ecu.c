@@ -129,6 +129,7 @@ static void command_drive(ecu_t *ecu)
     lower_limits(&limits, &in, request->torque_arbitrated);
     request->limits = limits;
     request->enable = in.run;
+    request->may_hold = ecu->supervisor.state == STATE_READY;
     request->fault_resets = ecu->supervisor.resets;
     ecu_request_commissioning(ecu);
 }

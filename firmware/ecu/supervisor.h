@@ -21,7 +21,7 @@
     X(INIT, 0, "After start-up, until the self-test has passed.") \
     X(STANDBY, 1, "The dc link is off; mode torque charges it.") \
     X(PRECHARGE, 2, "The dc link is being charged.") \
-    X(READY, 3, "The dc link is charged and switching is disabled; enable is accepted.") \
+    X(READY, 3, "The dc link is charged; enable is accepted. At speed the torque may be held at zero.") \
     X(RUN, 4, "Switching is enabled and the torque follows the request.") \
     X(DERATE, 5, "As run, with the torque limited for the reason that DeratingReason names.") \
     X(SAFE_STATE, 6, "A fault tripped the drive, which applies its safe state; the machine turns fast.") \

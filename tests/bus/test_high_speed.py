@@ -242,13 +242,45 @@ def test_the_held_torque_ends_with_disabled_switching_when_the_machine_is_slower
     assert fast.get("fault_word") == 0.0
 
 
-@pytest.mark.parametrize("rpm", [9000.0, 9900.0, -10000.0])
-def test_enable_is_granted_where_the_diodes_already_charge_the_battery(rpm: float) -> None:
-    """The machine has been accelerated from outside in state ready."""
+@pytest.fixture
+def ready() -> Iterator[Ecu]:
+    """In state ready at standstill."""
     ecu = Ecu()
     ecu.power_up(BATTERY_V)
     ecu.run(50, Enable=0)
-    turn_to(ecu, rpm, 2.0)
-    assert ecu.state == "ready"
-    runs_again(ecu)
+    yield ecu
     ecu.close()
+
+
+def worst_on_the_way_to(ecu: Ecu, rpm: float) -> Worst:
+    """As worst(), while the speed changes by 2 rad/s per millisecond."""
+    torque, current = 0.0, 0.0
+    while abs(left := rpm * RPM - ecu.speed_rad_s) > 1e-9:
+        ecu.speed_rad_s += math.copysign(min(abs(left), 2.0), left)
+        seen = worst(ecu, 1)
+        torque, current = max(torque, seen.torque_Nm), max(current, seen.current_A)
+    return Worst(torque, current)
+
+
+# Without control the diodes brake with 55 N.m from 9900 rpm on.
+@pytest.mark.parametrize("rpm", [9000.0, 9900.0, -10000.0])
+def test_a_vehicle_that_rolls_ever_faster_in_state_ready_is_not_braked_by_the_diodes(ready: Ecu, rpm: float) -> None:
+    on_the_way = worst_on_the_way_to(ready, rpm)
+    held = worst(ready, 300)
+    assert max(on_the_way.torque_Nm, held.torque_Nm) < 2.0
+    assert max(on_the_way.current_A, held.current_A) < 40.0
+    assert ready.state == "ready"
+    assert ready.get("run_state") == RUNS
+    runs_again(ready)
+    ready.run(50, Enable=0, TorqueRequested=0.0)
+    turn_to(ready, 0.0, 2.0)
+    assert ready.get("run_state") == OFF
+    assert ready.get("fault_word") == 0.0
+
+
+def test_holding_the_torque_at_zero_in_state_ready_ends_with_a_fault_in_the_short_circuit(ready: Ecu) -> None:
+    turn_to(ready, FAST_RPM, 2.0)
+    ready.set("angle_stuck", 1.0)
+    assert highest_V(ready, 500) < 1.02 * BATTERY_V
+    assert ready.state == "safe_state"
+    slow_down_to_fault(ready)

@@ -15,7 +15,9 @@ from fluxtrue_tools.sim.motor import load
 
 CAMPAIGN = spec.read(Path(__file__).with_name("campaign.toml"))
 STRONG = "plant.magnet_scale=1.06"
-PRIUS = Path(__file__).resolve().parents[1] / "motors" / "prius"
+MOTORS = Path(__file__).resolve().parents[1] / "motors"
+PRIUS = MOTORS / "prius"
+PMSYRM = MOTORS / "pmsyrm"
 HOT = "plant.winding_C=240"
 
 
@@ -74,3 +76,10 @@ def test_about_its_level_a_machine_brakes_as_the_page_says(share: float, off_Nm:
 def test_just_above_its_level_much_saliency_brakes_at_once() -> None:
     assert braking_Nm("hsm1", 1.02, OFF, STRONG) > 45.0
     assert braking_Nm("hsm1", 1.02, LOWER, STRONG) < 3.0
+
+
+@pytest.mark.parametrize(("share", "off_Nm", "shorted_Nm"), [(0.78, 0.0, 3.3), (0.82, 30.3, 3.3), (0.9, 34.3, 3.0)])
+def test_the_most_saliency_needs_the_lowest_level(share: float, off_Nm: float, shorted_Nm: float) -> None:
+    """The rows `pmsyrm` of docs/theory/safe-state.md; tests/tools/motor/test_rectifier.py has the level."""
+    assert round(braking_Nm(str(PMSYRM), share, OFF, torque_Nm=-30.0), 1) == off_Nm
+    assert round(braking_Nm(str(PMSYRM), share, LOWER, torque_Nm=-30.0), 1) == shorted_Nm

@@ -66,7 +66,8 @@ def test_the_level_is_never_above_that_of_pulses() -> None:
     assert motor.derived.share_short == 1.06
 
 
-def test_the_level_is_never_below_nine_tenths() -> None:
+def test_the_most_saliency_has_the_lowest_level() -> None:
+    """tests/fault/test_braking.py has what its diodes do above it."""
     motor = load_motor(MOTORS.parent.parent / "tests" / "motors" / "pmsyrm")
-    assert sustained_share(motor.model) < 0.8
-    assert motor.derived.share_short == 0.9
+    assert motor.derived.share_short == pytest.approx(sustained_share(motor.model), abs=0.005)
+    assert motor.derived.share_short < 0.78

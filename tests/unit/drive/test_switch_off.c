@@ -53,6 +53,28 @@ void test_enable_off_is_held_only_at_speed_and_without_a_fault(void)
     }
 }
 
+/* A vehicle that rolls faster and faster in state ready. */
+void test_holding_begins_with_switching_disabled_where_it_may(void)
+{
+    for (int k = 0; k < 7; k++) {
+        setUp();
+        drive.task.run_state = RUN_STATE_OFF;
+        drive.request.may_hold = k != 1;
+        drive.task.safe_state.rectifies = k != 2;
+        snapshot.angle_absolute = k != 3;
+        drive.held = k == 4;
+        drive.request.current_mode = k == 5;
+        faults = (k == 6) ? FAULT_TORQUE : 0U;
+        TEST_ASSERT_EQUAL_INT((k == 0) ? RUN_STATE_RUN : RUN_STATE_OFF, step(RUN_STATE_OFF));
+        TEST_ASSERT_EQUAL_INT(k == 0, switch_off_holds(&drive));
+    }
+    setUp();
+    drive.task.run_state = RUN_STATE_FAULT;
+    drive.request.may_hold = true;
+    snapshot.angle_absolute = true;
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, step(RUN_STATE_FAULT));
+}
+
 void test_only_faults_that_leave_control_intact_are_kept_back(void)
 {
     static const struct {

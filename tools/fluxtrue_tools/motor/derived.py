@@ -80,7 +80,6 @@ NOISE_SHARE = 0.002  # of a current converter's full scale, rms
 NOISE_CREST = 4.0 * 0.27  # 4 times the rms of a mean of four steps: (MN-35)
 PERIOD_NOISE_CREST = 4.0 / 3.0  # times the rms; hsm1 needs no more than its V_0
 MONITOR_NOISE_SHARE = 0.04  # of i_max: the bridge's zero crossing and noise look like a voltage on no current
-SHARE_SHORT_MIN = 0.9  # of v_dc, by the line back-EMF: (SS-25)
 SHARE_HYSTERESIS = 0.1
 V_RELEASE_PER_VDC = 1.15
 
@@ -394,7 +393,7 @@ def _slow_monitors(config: MotorConfig, model: FluxModel, bases: Bases) -> dict[
 
 def _short_circuit_share(model: FluxModel) -> float:
     """Of the dc voltage, above which a fault shorts the phases (SS-25), to a hundredth."""
-    return round(min(max(SHARE_SHORT_MIN, sustained_share(model)), PULSE_SHARE), 2)
+    return round(min(sustained_share(model), PULSE_SHARE), 2)
 
 
 def _monitors(config: MotorConfig, model: FluxModel) -> dict[str, float]:
