@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/angle.h"
 
+#include "fx/codegen.h"
 #include "fx/q.h"
 #include "hal/s32k144/ad2s1210.h"
 #include "hal/s32k144/angle.h"
@@ -54,12 +55,19 @@ float angle_first_speed(void)
     return (frame.fault != 0U) ? -1.0F : (float)fx_abs_q31((int16_t)frame.value) * VELOCITY_TURNS_PER_S;
 }
 
+/* Not inlined: with one access to the last frame in each of two branches its address would be kept on the stack until
+ * angle_fault(), by two instructions in every period. */
+static FX_NOT_INLINED FX_COLD uint32_t without_frame(void)
+{
+    const uint32_t frame = position + ONE_MISSING;
+    return frame | ((frame >= MISSING_MAX) ? AD2S1210_FAULTS : 0U); /* stays when the count overflows */
+}
+
 uint32_t hal_angle_read(void)
 {
     uint32_t frame;
     if (serial_angle_read(ANY_WORD, &frame) == 0U) {
-        frame = position + ONE_MISSING;
-        frame |= (frame >= MISSING_MAX) ? AD2S1210_FAULTS : 0U; /* stays when the count overflows */
+        frame = without_frame();
     }
     position = frame;
     return (uint32_t)ad2s1210_decode(frame).value << 16;
