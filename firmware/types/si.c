@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "types/si.h"
 
+#include "fx/codegen.h"
+
 #define Q15_ONE 32768.0F
 #define Q31_ONE 2147483648.0F
 
@@ -27,7 +29,8 @@ q31_t q31_from_si(float value, float base)
     return (x >= 1.0F) ? Q31_MAX : (x > -1.0F) ? nearest(x * Q31_ONE) : -Q31_MAX;
 }
 
-q15_t q15_from_si(float value, float base)
+/* Not inlined: no step needs it often, and ten copies would take 400 bytes. */
+FX_NOT_INLINED q15_t q15_from_si(float value, float base)
 {
     const float x = value / base;
     return (x >= 1.0F) ? Q15_MAX : (x > -1.0F) ? fx_sat_q15(nearest(x * Q15_ONE)) : (q15_t)-Q15_MAX;
