@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "drive/common_gain.h"
+#include "drive/gain_jump_check.h"
 
 /* The part of the voltage of i* that a quarter of it makes, with the tables' flux. */
 static dq_q15_t voltage_per_quarter(const drive_t *drive, q15_t omega, winding_resistance_t r)
@@ -14,7 +14,7 @@ static dq_q15_t voltage_per_quarter(const drive_t *drive, q15_t omega, winding_r
     };
 }
 
-uint32_t common_gain_step(drive_t *drive, const snapshot_t *snapshot, bool comparable, winding_resistance_t r)
+uint32_t gain_jump_check(drive_t *drive, const snapshot_t *snapshot, bool comparable, winding_resistance_t r)
 {
     task_state_t *task = &drive->task;
     const torque_monitor_config_t *config = &drive->motor->torque_monitor;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#ifndef DRIVE_COMMON_GAIN_H
-#define DRIVE_COMMON_GAIN_H
+#ifndef DRIVE_GAIN_JUMP_CHECK_H
+#define DRIVE_GAIN_JUMP_CHECK_H
 /** Feeds safety/gain_jump.h: current sensors whose common gain jumps.
  * Source   docs/theory/monitors.md (MN-58) ... (MN-61)
  * Units    per unit
@@ -11,6 +11,6 @@
 
 /** comparable: the window of this step is complete, the bridge acts, and the compensation of dead time is that of the
  * last step. */
-uint32_t common_gain_step(drive_t *drive, const snapshot_t *snapshot, bool comparable, winding_resistance_t r);
+uint32_t gain_jump_check(drive_t *drive, const snapshot_t *snapshot, bool comparable, winding_resistance_t r);
 
 #endif

@@ -2,7 +2,7 @@
 #include "drive/slow_monitors.h"
 
 #include "control/current/transform.h"
-#include "drive/common_gain.h"
+#include "drive/gain_jump_check.h"
 #include "fx/codegen.h"
 
 static inline FX_INLINED_IF_OPTIMISED abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
@@ -210,7 +210,7 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
     }
     const bool behind = u_behind > drive->motor->torque_monitor.v_lag;
     const winding_resistance_t r = torque_monitor_resistance(&drive->motor->torque_monitor, snapshot->winding_dC);
-    uint32_t faults = of_currents | shorted | common_gain_step(drive, snapshot, comparable, r);
+    uint32_t faults = of_currents | shorted | gain_jump_check(drive, snapshot, comparable, r);
     faults |= check_torque(drive, snapshot, r);
     faults |= check_angle(drive, snapshot, phases.reference, acting, behind);
     faults |= check_launch(drive, snapshot, acting, behind, r);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* What the monitor of a common gain of the current sensors is fed with, and which voltage belongs to the current. */
-#include "drive/common_gain.h"
+#include "drive/gain_jump_check.h"
 
 #include <math.h>
 
@@ -48,7 +48,7 @@ void tearDown(void)
 
 static uint32_t step(void)
 {
-    return common_gain_step(&drive, &snapshot, true, r);
+    return gain_jump_check(&drive, &snapshot, true, r);
 }
 
 static void run(int steps)
@@ -126,7 +126,7 @@ void test_the_last_residual_the_current_and_the_speed_count(void)
 void test_without_a_complete_window_or_a_settled_torque_monitor_it_begins_anew(void)
 {
     run(SETTLED);
-    TEST_ASSERT_EQUAL_HEX32(0, common_gain_step(&drive, &snapshot, false, r));
+    TEST_ASSERT_EQUAL_HEX32(0, gain_jump_check(&drive, &snapshot, false, r));
     TEST_ASSERT_EQUAL_UINT8(0, drive.task.gain_jump.steps);
     run(SETTLED);
     TEST_ASSERT_EQUAL_UINT8(SETTLED, drive.task.gain_jump.steps);
