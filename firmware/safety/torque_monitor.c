@@ -141,13 +141,14 @@ uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monit
     const dq_q15_t psi_mean = {(in->psi.d + state->psi.d) / 2, (in->psi.q + state->psi.q) / 2};
     state->psi = in->psi;
     state->omega = in->omega;
-    const q15_t drop_d = fx_mul_gain_q15(now.r.r, (q15_t)in->i.d);
-    const q15_t drop_q = fx_mul_gain_q15(now.r.r, (q15_t)in->i.q);
-    const dq_q15_t emf = {fx_sat_q15(in->u.d - drop_d - rate.d), fx_sat_q15(in->u.q - drop_q - rate.q)};
+    /* The part of the voltage that does not turn the rotor: drop of the resistance, and change of the flux. */
+    const dq_q15_t other = {fx_mul_gain_q15(now.r.r, (q15_t)in->i.d) + rate.d,
+                            fx_mul_gain_q15(now.r.r, (q15_t)in->i.q) + rate.q};
+    const dq_q15_t emf = {fx_sat_q15(in->u.d - other.d), fx_sat_q15(in->u.q - other.q)};
     const bool torque_bad = is_torque_excessive(config, state, in, &now, emf, rate);
     const dq_q15_t residual = {
-        fx_sat_q15(in->u_mean.d - drop_d - rate.d) + fx_mul_q15(now.speed.omega, (q15_t)psi_mean.q),
-        fx_sat_q15(in->u_mean.q - drop_q - rate.q) - fx_mul_q15(now.speed.omega, (q15_t)psi_mean.d),
+        fx_sat_q15(in->u_mean.d - other.d) + fx_mul_q15(now.speed.omega, (q15_t)psi_mean.q),
+        fx_sat_q15(in->u_mean.q - other.q) - fx_mul_q15(now.speed.omega, (q15_t)psi_mean.d),
     };
     state->residual = (dq_q15_halfword_t){fx_sat_q15(residual.d), fx_sat_q15(residual.q)};
     const bool angle_bad = is_angle_implausible(config, in, &now, residual, rate);

@@ -49,9 +49,12 @@ static q31_t integrate(const torque_loop_config_t *config, const torque_loop_in_
     }
     const int32_t relative = relative_error(config, in, magnitude, error);
     const q31_t moved = fx_add_q31(correction, product_q31(config->ki, relative));
+    if (!in->limited) {
+        return moved;
+    }
     /* At a limit a correction above 0 has no effect; kept, it would be too much torque after the limit (TL-7). */
     const q31_t kept = correction - (decay(config, correction) >> LIMITED_DECAY_BITS);
-    return in->limited ? fx_min_s32(moved, fx_max_s32(kept, 0)) : moved;
+    return fx_min_s32(moved, fx_max_s32(kept, 0));
 }
 
 q15_t torque_loop_step(const torque_loop_config_t *config, torque_loop_state_t *state, const torque_loop_in_t *in)
