@@ -28,12 +28,10 @@ static int32_t round_shift(int64_t x, unsigned n)
 /* Not inlined: one copy takes less memory. */
 static FX_NOT_INLINED int64_t dot(const int32_t *a, const int32_t *b)
 {
-    const int32_t *const end = &a[IDENTIFY_STATES];
     int64_t sum = 0;
-    while (a != end) {
-        sum += (int64_t)*a * *b;
-        a++;
-        b++;
+    FX_UNROLLED
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        sum += (int64_t)a[j] * b[j];
     }
     return sum;
 }
@@ -105,13 +103,16 @@ int64_t kalman_output_variance_prior(const jacobian_row_t *row)
 }
 
 /* 1/s of a variance s >= S_MIN_Q60, whose upper word is therefore not zero. Only the leading 16 bits of s are used,
- * rounded up: the gain is never larger than the optimum, which keeps P positive definite (ID-11). */
+ * rounded up: the gain is never larger than the optimum, which keeps P positive definite (ID-11). They are shifted word
+ * by word, as in round_shift(): zeros is at most 25. */
 static reciprocal_t reciprocal(int64_t s_q60)
 {
     const int64_t limited_q60 = (s_q60 < S_MIN_Q60) ? S_MIN_Q60 : s_q60;
-    const unsigned shift = 64U - fx_leading_zeros((uint32_t)(limited_q60 >> 32)) - DIVISOR_BITS;
-    const uint32_t mantissa = (uint32_t)(limited_q60 >> shift) + 1U;
-    return (reciprocal_t){(int32_t)(UINT32_MAX / mantissa), shift};
+    const uint32_t high = (uint32_t)(limited_q60 >> 32), low = (uint32_t)limited_q60;
+    const unsigned zeros = fx_leading_zeros(high);
+    const uint32_t leading = high << zeros | low >> 1 >> (31U - zeros);
+    const uint32_t mantissa = (leading >> (32U - DIVISOR_BITS)) + 1U;
+    return (reciprocal_t){(int32_t)(UINT32_MAX / mantissa), 64U - zeros - DIVISOR_BITS};
 }
 
 /* x += k e for one state; true if it was clamped. |k e| < 128/16. */
@@ -128,12 +129,12 @@ static bool update_state(int32_t *x_q27, int32_t gain_q24, int32_t innovation_q3
 static int32_t *update_row(int32_t *p, int32_t gain_q24, const int32_t *ph_q30, unsigned n)
 {
     const int32_t *const end = &p[n];
-    while (p != end) {
+    do {
         const int64_t reduction = (int64_t)gain_q24 * *ph_q30 + (1 << 23);
         *p -= (int32_t)(reduction >> 24);
         ph_q30++;
         p++;
-    }
+    } while (p != end);
     return p;
 }
 
