@@ -182,9 +182,10 @@ static void count_in_short_side(drive_t *drive, const snapshot_t *snapshot, cons
  * latched or the short circuit is on, the decision of the last step before it is kept: switching is disabled first.
  * Half a step lies between two samples, so that the second harmonic of a half wave, which may turn by a whole turn in a
  * step, does not look constant. */
-static void update_short_side(drive_t *drive, const snapshot_t *snapshot, const phase_currents_t *phases)
+static void update_short_side(drive_t *drive, const snapshot_t *snapshot, const phase_currents_t *phases,
+                              uint64_t turns_q60)
 {
-    const bool constant = is_second_harmonic_constant(turns_of_step_q60(drive, snapshot->sample.point.omega));
+    const bool constant = is_second_harmonic_constant(turns_q60);
     const uint32_t half_step = drive->period.periods_per_step / 2U;
     const sample_t *before = sample_box_at(&drive->samples, snapshot->generation - half_step);
     if (before->acting) {
@@ -202,7 +203,8 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
                                      in_phases(drive->task.i_ref, snapshot->sample.theta_e)};
     const bool comparable = !is_compensation_new(drive) && !snapshot->mrai_is_chosen && snapshot->window.acting &&
                             snapshot->sample.acting;
-    const bool acting = comparable && !is_fast(turns_of_step_q60(drive, snapshot->sample.point.omega));
+    const uint64_t turns_q60 = turns_of_step_q60(drive, snapshot->sample.point.omega);
+    const bool acting = comparable && !is_fast(turns_q60);
     const q15_t u_behind = torque_monitor_missing_voltage(snapshot->lag, drive->task.psi_ref);
     const uint32_t of_currents = check_currents(drive, snapshot, &phases, u_behind);
     if (drive_is_moving(drive)) { /* with the angle of a movement, comparisons with the motor data have no meaning */
@@ -214,6 +216,6 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
     faults |= check_torque(drive, snapshot, r);
     faults |= check_angle(drive, snapshot, phases.reference, acting, behind);
     faults |= check_launch(drive, snapshot, acting, behind, r);
-    update_short_side(drive, snapshot, &phases);
+    update_short_side(drive, snapshot, &phases, turns_q60);
     return faults;
 }
