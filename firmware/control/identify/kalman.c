@@ -28,10 +28,12 @@ static int32_t round_shift(int64_t x, unsigned n)
 /* Not inlined: one copy takes less memory. */
 static FX_NOT_INLINED int64_t dot(const int32_t *a, const int32_t *b)
 {
-    int64_t sum = 0;
+    int64_t sum = (int64_t)a[IDENTIFY_STATES - 1U] * b[IDENTIFY_STATES - 1U]; /* a pair has no partner for it */
     FX_UNROLLED
-    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
-        sum += (int64_t)a[j] * b[j];
+    for (unsigned j = 0; j < IDENTIFY_STATES - 1U; j += 2U) {
+        const fx_two_words_t x = fx_load_two_words(&a[j]), y = fx_load_two_words(&b[j]);
+        sum += (int64_t)x.first * y.first;
+        sum += (int64_t)x.second * y.second;
     }
     return sum;
 }
