@@ -96,15 +96,6 @@ FX_COLD angle_t angle_tracker_coast(const angle_tracker_config_t *config, angle_
     return angle;
 }
 
-/* The prediction is theta_e + step - (1 - k_p) e. */
-FX_COLD int32_t angle_tracker_advance(const angle_tracker_config_t *config, const angle_tracker_state_t *state,
-                                      uint32_t theta_e, int32_t step)
-{
-    const uint32_t without_correction = theta_e + (uint32_t)step - state->predicted;
-    const uint32_t error = without_correction + 2U * (uint32_t)fx_mulhi(config->kp, (int32_t)without_correction);
-    return (int32_t)((uint32_t)step + 2U * (uint32_t)fx_mulhi(config->kp, (int32_t)error));
-}
-
 /* Whether the sensor has failed or the rotor stands. A reading that repeats for longer than the sensor's resolution
  * explains (AT-16) is a sensor failure, unless the rotor lagged behind the prediction before: then it stops (AT-17). */
 static repeat_cause_t cause_of_repeats(const angle_tracker_config_t *config, const angle_tracker_state_t *state,
