@@ -6,8 +6,12 @@ import re
 import pytest
 from click.testing import CliRunner
 
-from fluxtrue_tools.commission.over_can import main, score_text, turned_text
+from fluxtrue_tools.commission import hidden
+from fluxtrue_tools.commission.dc_zero import DcZero
+from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.over_can import dc_zero_text, main, score_text, turned_text
 from fluxtrue_tools.commission.score import Score, Turned
+from fluxtrue_tools.sim.motor import Motor
 
 R_PERCENT = 1.0
 
@@ -20,6 +24,15 @@ def test_the_errors_are_printed_in_the_units_of_the_page() -> None:
     assert said == ("connection: right; offset -0.059 degrees; psi_f beyond the gain of the dc voltage +0.11 %; "
                     "inertia -0.4 %; drag 0.5 % rms")  # fmt: skip
     assert turned_text(Turned(False, 0.0, 0.0, 0.0, 0.0, 0.0)).startswith("connection: WRONG")
+
+
+def test_an_offset_that_is_not_found_has_no_error(unknown: Motor, known: Nameplate) -> None:
+    truth, _, _ = hidden.draw("saturated", 12, unknown, known.i_max_A)
+    plant = truth.plant
+    plant["vdc_offset_V"] = -0.001 * plant["vdc_full_scale_V"]
+    named = "offset of the dc voltage's sensor: "
+    assert dc_zero_text(DcZero(unknown="still charged"), truth) == f"{named}not found: still charged"
+    assert dc_zero_text(DcZero(unknown=""), truth) == f"{named}+0.100 % of the full scale"
 
 
 @pytest.mark.parametrize(("steps", "connected"), [("resistance", True), ("offsets,phases", False)])

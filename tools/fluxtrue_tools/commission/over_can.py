@@ -16,6 +16,7 @@ from fluxtrue_tools.commission import hidden, on_the_bus
 from fluxtrue_tools.commission.bus import OverTheBus
 from fluxtrue_tools.commission.campaign import FOLDER
 from fluxtrue_tools.commission.cli import nameplate_of
+from fluxtrue_tools.commission.dc_zero import DcZero
 from fluxtrue_tools.commission.hidden import Truth
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import (
@@ -45,15 +46,19 @@ def turned_text(found: Turned) -> str:
             f"{100.0 * found.inertia:+.1f} %; drag {100.0 * found.drag:.1f} % rms")  # fmt: skip
 
 
+def dc_zero_text(found: DcZero, truth: Truth) -> str:
+    """The error of the dc-voltage sensor's offset, or why there is none: what is left then is no error of a step."""
+    said = (f"not found: {found.unknown}" if found.unknown else
+            f"{100.0 * dc_zero_error(found, truth):+.3f} % of the full scale")  # fmt: skip
+    return f"offset of the dc voltage's sensor: {said}"
+
+
 def measure(drive: OverTheBus, truth: Truth, known: Nameplate, steps: list[Step]) -> None:
     """Run the steps and print their errors."""
     begun = time.process_time()
     found = run(drive, steps, known, click.echo)
     click.echo(f"{drive.line.now_s:.0f} s of the bus, {time.process_time() - begun:.0f} s of the evaluation")
-    if found.dc_zero.unknown:
-        click.echo(f"offset of the dc voltage's sensor: not found: {found.dc_zero.unknown}")
-    click.echo(f"offset of the dc voltage's sensor: {100.0 * dc_zero_error(found.dc_zero, truth):+.3f} % of the full "
-               "scale")  # fmt: skip
+    click.echo(dc_zero_text(found.dc_zero, truth))
     if found.followed is not None:
         click.echo(f"connection: {found.followed.connection}, true: {truth.plant['pole_pairs']:.0f} pole pairs, "
                    f"reversed {truth.reversed}, {truth.offset_rad:.4f} rad")  # fmt: skip
