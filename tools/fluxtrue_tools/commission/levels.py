@@ -29,6 +29,7 @@ RESOLUTION_V = 0.005  # rms: what a mean voltage is certain to beyond the noise
 TRIES = 3
 QUIET_RAD = 0.07  # electrical: a level that moved the rotor further is repeated, (CM-26) has the guess of psi_f
 KNEES, KNEE_STEPS = (1e-4, 0.02), 24  # of the largest level: where the legs' knee is looked for
+KNEE_LOG = 0.01  # to which its logarithm is found
 EXPLAINS = 0.01  # of the residuals' sum of squares: more than a knee removes by chance
 NEAR = 1.05  # for the slope over the knee
 COMMON = 3  # unknowns of all levels
@@ -146,7 +147,8 @@ class _Equations:
 
         logs = np.log(largest_A * np.geomspace(*KNEES, KNEE_STEPS))
         best = min(range(1, len(logs) - 1), key=lambda k: left(logs[k]))
-        found = minimize_scalar(left, bounds=(logs[best - 1], logs[best + 1]), method="bounded")
+        found = minimize_scalar(left, bounds=(logs[best - 1], logs[best + 1]), method="bounded",
+                                options={"xatol": KNEE_LOG})  # fmt: skip
         (sharp, sharp_left), (soft, _) = (self.solve(self.rows(knee_A)) for knee_A in (0.0, math.exp(found.x)))
         shows = found.fun < (1.0 - EXPLAINS) * sharp_left and abs(soft[0] - sharp[0]) * largest_A > RESOLUTION_V
         return math.exp(found.x) if shows else 0.0
