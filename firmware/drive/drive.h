@@ -55,10 +55,10 @@ typedef struct {
     bool identification;
     bool trim; /* the dead-time compensation follows what is identified */
     identification_mode_t identification_mode;
-    bool pulses_agreed;             /* else no voltage pulses start, and those that run end */
-    bool may_hold; /* the bridge may switch with enable off where disabled switching would rectify: (SS-12) */
-    uint32_t faults;                /* found outside of the drive, by the second level: latched as the drive's own */
-    uint32_t fault_resets;          /* counts up: each count clears the faults once, if enable is off */
+    bool pulses_agreed;    /* else no voltage pulses start, and those that run end */
+    bool may_hold;         /* the bridge may switch with enable off where disabled switching would rectify: (SS-12) */
+    uint32_t faults;       /* found outside of the drive, by the second level: latched as the drive's own */
+    uint32_t fault_resets; /* counts up: each count clears the faults once, if enable is off */
     uint32_t identification_resets; /* counts up: each count resets the identification once */
     uint32_t commissionings; /* counts up: each count measures the inverter's voltage error once, at standstill */
     pulses_request_t pulses;

@@ -226,11 +226,7 @@ static FX_NOT_INLINED FX_COLD void run_period_not_settled(drive_t *drive)
         reset_faults(drive, command->fault_resets);
     }
     sample_t *sample = sample_box_begin(&drive->samples);
-    int32_t own_step = acquire_sample(drive, sample, false).angle_step;
-    if (turning_control_used(&drive->motor->turning_control)) { /* what it feeds forward must not lag: (CC-26) */
-        own_step = angle_tracker_advance(&drive->period.angle_tracker, &drive->fast.angle_tracker, sample->theta_e,
-                                         own_step);
-    }
+    const int32_t own_step = acquire_advance(drive, sample, acquire_sample(drive, sample, false).angle_step);
     run_period_checked(drive, sample, drive_take_frame(drive, command, sample, own_step));
 }
 

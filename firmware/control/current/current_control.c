@@ -9,7 +9,7 @@
 #define HALF_LSB_Q22 64
 #define V_D_MIN Q15(0.7)                     /* share of the circle that the d axis may usually use (CC-11) */
 #define V_D_LEAST (127 * 128 + 64)           /* 0.498: the same while q is far from its flux; the middle of a cell */
-#define V_Q_FAR (3 << 14)                    /* v_q = 1.5, q15: the q axis is far from its flux (CC-11) */
+#define V_Q_FAR 49152                        /* v_q = 1.5, q15: the q axis is far from its flux (CC-11) */
 #define CIRCLE_SHIFT 7                       /* 256 cells of the circle's table */
 #define V_Q_LEAVES_MIN (182 * 128)           /* from here on, q15, the circle's cells leave d less than V_D_MIN */
 #define INSIDE_CIRCLE_Q30 (127 << 23)        /* |v|^2 = 127/128: below, no cell of the circle's table limits v */

@@ -206,8 +206,8 @@ void test_what_disturbed_the_means_is_not_before_the_jump(void)
     }
 }
 
-/* Dead time can make the currents of a rotor at rest oscillate. Their reading is off again and again, and where the mean
- * of the residual begins and ends in such a wave, it changes. */
+/* Dead time can make the currents of a rotor at rest oscillate. Their reading is off again and again, and the mean of
+ * the residual depends on where in such a wave it begins and ends. */
 void test_a_reading_that_was_off_in_the_steps_before_is_no_jump(void)
 {
     static const int since[] = {SETTLED - 2, SETTLED - 1};
