@@ -47,7 +47,8 @@ static motor_check_t monitors_check(const motor_t *m)
     if (m->safe_state.psi_f <= 0) {
         return MOTOR_CHECK_SAFE_STATE_FLUX;
     }
-    return (m->safe_state.share_open < m->safe_state.share_short) ? MOTOR_CHECK_OK : MOTOR_CHECK_SAFE_STATE_LEVELS;
+    const bool ordered = m->safe_state.share_open > 0 && m->safe_state.share_open < m->safe_state.share_short;
+    return ordered ? MOTOR_CHECK_OK : MOTOR_CHECK_SAFE_STATE_LEVELS;
 }
 
 /* (MO-11): the largest difference between two phases is sqrt(3) v_ratio |v|; current control may limit from 31/32 on.

@@ -29,9 +29,17 @@ bool switch_off_may_switch(const drive_t *drive, const snapshot_t *snapshot)
 static bool controls_at_speed(const drive_t *drive, const snapshot_t *snapshot, run_state_t wanted)
 {
     const task_state_t *task = &drive->task;
-    const bool begins = drive->request.may_hold && switch_off_may_switch(drive, snapshot);
+    const bool begins = drive->request.may_hold && !movement_is_agreed(&task->movement) &&
+                        switch_off_may_switch(drive, snapshot);
     return (task->run_state == RUN_STATE_RUN || begins) && wanted != RUN_STATE_FAULT && task->safe_state.rectifies &&
            !drive_bypasses_torque_path(drive);
+}
+
+/* Whether currents flow that can still be moved to those of the short circuit. */
+static bool can_move(const task_state_t *task, uint32_t faults)
+{
+    return task->run_state == RUN_STATE_RUN && task->safe_state.short_circuit && faults != 0U &&
+           (faults & ~FAULTS_CONTROLLED) == 0U;
 }
 
 run_state_t switch_off_step(drive_t *drive, const snapshot_t *snapshot, run_state_t wanted, uint32_t *faults)
@@ -40,9 +48,7 @@ run_state_t switch_off_step(drive_t *drive, const snapshot_t *snapshot, run_stat
     switch_off_t *off = &task->switch_off;
     const bool controls = controls_at_speed(drive, snapshot, wanted);
     off->holds = controls && wanted == RUN_STATE_OFF && *faults == 0U; /* (SS-12) */
-    const bool shorts = controls && task->safe_state.short_circuit;
-    const bool moves = shorts && *faults != 0U && (*faults & ~FAULTS_CONTROLLED) == 0U;
-    if (!moves || off->steps == STEPS) {
+    if (!controls || !can_move(task, *faults) || off->steps == STEPS) {
         off->steps = 0;
         return off->holds ? RUN_STATE_RUN : wanted;
     }

@@ -3,9 +3,9 @@
 #define DRIVE_SWITCH_OFF_H
 /** Leaving torque where disabled switching would rectify.
  *   Enable off: the torque goes to zero at the fastest slew rate, and the current control holds it there until
- *     switching can be disabled. Where this speed is reached with enable off, it begins to if request.may_hold. The
- *     currents are those of field weakening without torque: far below those of the short circuit, which some machines
- *     cannot withstand.
+ *     switching can be disabled. If the rotor reaches this speed with enable off, control begins only with
+ *     request.may_hold. The currents are those of field weakening without torque: far below those of the short circuit,
+ *     which some machines cannot withstand.
  *   Over-temperature and over-speed leave current control intact, but latching the fault ends it. Before the fault is
  *     latched, i* moves in 8 steps to the steady current of the short circuit, psi_d(i_d, 0) + dpsi = 0 and i_q = 0,
  *     and stays there for 2 steps.

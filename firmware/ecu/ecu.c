@@ -110,7 +110,7 @@ static void answer(ecu_t *ecu)
     hal_shut_off_answer(ecu->shut_off.wrong ? ~right : right);
 }
 
-/* A falling limit and a ramp to zero do not wait for the calibrated slew, only until the arbitrated torque is there. */
+/* A falling limit and a ramp to zero act without the calibrated slew, once the arbitrated torque has reached them. */
 static void lower_limits(torque_limits_t *limits, const arbitrate_in_t *in, q15_t arbitrated)
 {
     const q15_t magnitude = fx_abs_q15(arbitrated);

@@ -26,8 +26,8 @@ static bool is_candidate(const torque_monitor_config_t *config, const gain_jump_
     return in->current > 4 * config->i_0 && along > fx_mul_q30(in->current, config->i_0) >> 2;
 }
 
-/* The means begin with the second residual, because the torque monitor may not have known the first. Until 16 steps
- * have passed, each step has nearly the same weight: one that is disturbed would otherwise be in the mean for long. */
+/* The means begin with the second residual, because the torque monitor may not have known the first. The weight of a
+ * new step falls from 1 to 1/16 in the first 16: with 1/16 at once the first step would have most of the weight. */
 static void follow(gain_jump_state_t *state, const gain_jump_in_t *in)
 {
     const int shift = fx_min_s32(31 - (int)fx_leading_zeros(state->steps | 1U), MEAN);

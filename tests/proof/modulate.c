@@ -83,7 +83,8 @@ void proof_voltage_circle(void)
     PROVE(IS_Q15(limited.d) && IS_Q15(limited.q));
     PROVE(limited.q <= left_by(limited.d) && limited.q >= -left_by(limited.d) - 1);
     const int32_t left = left_by(fx_sat_q15_word(v.q));
-    const int32_t d_max = (left > V_D_MIN) ? left : V_D_MIN;
+    const int32_t least = ((v.q ^ (v.q >> 31)) < V_Q_FAR) ? V_D_MIN : V_D_LEAST;
+    const int32_t d_max = (left > least) ? left : least;
     PROVE(error_d <= 0 || (limited.d <= d_max && limited.d >= -d_max - 1));
     const int32_t d = fx_sat_q15_word(v.d);
     PROVE(error_d <= 0 || d > d_max || d < -d_max - 1 || limited.d == d);

@@ -133,7 +133,7 @@ static int32_t remaining_for_d(const uint16_t *circle, int32_t q)
 
 /* The d axis has priority while its flux is to fall and its voltage is negative, because cutting this voltage would
  * let the flux rise. Otherwise d gets what q leaves of the circle: the q flux may be what limits the d axis. The d
- * axis keeps 0.7, or else its flux would fall further and i_d would grow (CC-11). What the d axis lacks is
+ * axis keeps 0.7 or half, or else its flux would fall further and i_d would grow (CC-11). What the d axis lacks is
  * subtracted from q: only a smaller q flux gives the d axis its voltage (CC-14). error_d: only the sign acts. */
 static dq_q15_t limit_to_circle(dq_q15_t v, int32_t error_d, int32_t turn)
 {

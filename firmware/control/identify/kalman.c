@@ -25,6 +25,8 @@ static int32_t round_shift(int64_t x, unsigned n)
     return fx_sat_q31((int64_t)((uint64_t)(uint32_t)(high >> n) << 32 | low));
 }
 
+_Static_assert(IDENTIFY_STATES % 2U == 1U, "dot() takes pairs and one more");
+
 /* Not inlined: one copy takes less memory. */
 static FX_NOT_INLINED int64_t dot(const int32_t *a, const int32_t *b)
 {

@@ -197,7 +197,7 @@ MOVEMENT: dict[str, tuple[Check, PlantedError]] = {
     "the imposed movement needs the angle": (
         the_movement_carries_the_shaft_past_its_index,
         PlantedError(
-            "drive/task_1khz.c", "snapshot->angle_absolute || drive_imposes_angle(drive)", "snapshot->angle_absolute",
+            "drive/switch_off.c", "snapshot->angle_absolute || drive_imposes_angle(drive)", "snapshot->angle_absolute",
             FIRMWARE,
         ),
     ),

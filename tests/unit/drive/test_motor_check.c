@@ -91,7 +91,8 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     X(NORMAL_CURRENT_LEVEL, m.monitor.i_trip = 1) \
     X(NORMAL_CURRENT_LEVEL, m.monitor.zero_sequence_max = m.monitor.i_trip; m.monitor.sum_max = 3 * m.monitor.i_trip) \
     X(SAFE_STATE_FLUX, m.safe_state.psi_f = 0) \
-    X(SAFE_STATE_LEVELS, m.safe_state.share_open = m.safe_state.share_short)
+    X(SAFE_STATE_LEVELS, m.safe_state.share_open = m.safe_state.share_short) \
+    X(SAFE_STATE_LEVELS, m.safe_state.share_open = 0)
 
 #define CONTROL(X) \
     X(CURRENT_CONTROL_GAINS, m.parameters.current_control.sigma_q24 = 0) \

@@ -68,6 +68,14 @@ void test_holding_begins_with_switching_disabled_where_it_may(void)
         TEST_ASSERT_EQUAL_INT((k == 0) ? RUN_STATE_RUN : RUN_STATE_OFF, step(RUN_STATE_OFF));
         TEST_ASSERT_EQUAL_INT(k == 0, switch_off_holds(&drive));
     }
+    setUp(); /* there are no currents to move to the short circuit, and i_ref is an old one */
+    drive.task.run_state = RUN_STATE_OFF;
+    drive.request.may_hold = true;
+    snapshot.angle_absolute = true;
+    faults = FAULT_TEMPERATURE;
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, step(RUN_STATE_OFF));
+    TEST_ASSERT_FALSE(switch_off_runs(&drive));
+    TEST_ASSERT_EQUAL_HEX32(FAULT_TEMPERATURE, faults);
     setUp();
     drive.task.run_state = RUN_STATE_FAULT;
     drive.request.may_hold = true;

@@ -223,7 +223,7 @@ void test_a_reading_that_was_off_in_the_steps_before_is_no_jump(void)
     }
 }
 
-/* One step that is off by d moves the mean of the 33 steps until a jump by d/32 at most, in whichever step it is. */
+/* One step that is off by d moves the mean of the 33 steps until a jump by d/16 at most, in whichever step it is. */
 void test_no_step_weighs_much_in_the_mean_before_a_jump(void)
 {
     for (int disturbed = 0; disturbed < SETTLED; disturbed++) {

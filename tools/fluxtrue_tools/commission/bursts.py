@@ -36,7 +36,7 @@ FAR = 6.0  # times the noise: beyond it no sign is uncertain
 
 
 def upward_bounds(low_A: Array, high_A: Array, by_A: float, closer: float = 1.0) -> tuple[Array, Array]:
-    """As shown_bounds(), of bursts that all begin upwards; closer: times the upper bound, the lower one at most."""
+    """As shown_bounds(), of bursts that all begin upwards; the lower bound is at most closer times as far from 0."""
     high = high_A + by_A
     return np.maximum(low_A + by_A, -closer * high), high
 

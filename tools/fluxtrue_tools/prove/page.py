@@ -37,8 +37,8 @@ No solver finished within seconds for:
 - values written by XCP, and the set-up of its lists;
 - the torque limits as a whole (each of them is proved).
 
-Not tried: look-ups in the tables, the monitors of the 1 kHz task, the angle tracker, the identification, records of
-more than one piece.
+Not tried: look-ups in the tables, the other monitors of the 1 kHz task, the angle tracker, the identification, records
+of more than one piece.
 
 What the properties do not add up to:
 
