@@ -69,14 +69,6 @@ acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
     return (acquired_t){angle.step, normal};
 }
 
-int32_t acquire_advance(const drive_t *drive, const sample_t *sample, int32_t angle_step)
-{
-    if (!turning_control_used(&drive->motor->turning_control)) {
-        return angle_step;
-    }
-    return angle_tracker_advance(&drive->period.angle_tracker, &drive->fast.angle_tracker, sample->theta_e, angle_step);
-}
-
 /* Over-voltage by the last two samples before this one, and whether such a rise can be the link's. */
 static uint32_t check_rise(drive_t *drive, int32_t v_dc, uint32_t of_sample)
 {

@@ -2,7 +2,7 @@
 #ifndef DRIVE_ACQUIRE_H
 #define DRIVE_ACQUIRE_H
 /** The first part of a period: samples of converters and angle sensor in per unit, checked against their limits.
- * Source   docs/architecture.md, docs/theory/current-control.md (CC-26)
+ * Source   docs/architecture.md
  * Units    counts of the converters in, per unit of motor.bases out; angles in turns times 2^32
  * Range    every count and every angle
  * Errors   an implausible step of the angle is replaced by the prediction and reported to the monitors
@@ -16,10 +16,6 @@ typedef struct {
 
 /** settled: angle and speed of the tracker have been set by its first two samples. */
 acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled);
-
-/** The advance per period with which current control turns: that of the sample, angle_step, or where the field turns
- * far in a period one that does not lag (CC-26). */
-int32_t acquire_advance(const drive_t *drive, const sample_t *sample, int32_t angle_step);
 
 /** All sample monitors, with their counters; returns the phase currents. run: the bridge is commanded to act. */
 abc_q15_t acquire_check(drive_t *drive, const sample_t *sample, bool run);

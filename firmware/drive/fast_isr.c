@@ -226,7 +226,7 @@ static FX_NOT_INLINED FX_COLD void run_period_not_settled(drive_t *drive)
         reset_faults(drive, command->fault_resets);
     }
     sample_t *sample = sample_box_begin(&drive->samples);
-    const int32_t own_step = acquire_advance(drive, sample, acquire_sample(drive, sample, false).angle_step);
+    const int32_t own_step = acquire_sample(drive, sample, false).angle_step;
     run_period_checked(drive, sample, drive_take_frame(drive, command, sample, own_step));
 }
 

@@ -36,9 +36,8 @@ MAP_RMS, R_SHARE, BALANCE = 0.01, 0.01, 0.002
 # Machine, seed, number of the position of the rotor and noise: the worst of 300; two with a phase near zero current.
 DRAWS = [("saturated", 12, 72), ("saturated", 12, 240), ("saturated", 12, 294), ("hsm1", 135, 0), ("hsm1", 135, 6)]
 DRAW_RMS = 0.005
-# The winding drops 1.2 V at the largest current; a phase current is near zero at every level; large swings; without
-# (CM-50) the noise of a current near zero looks like a knee.
-LITTLE_VOLTAGE = [("saturated", 126), ("linear", 138), ("hsm1", 105), ("pmasynrm", 417)]
+# The winding drops 1.2 V at the largest current; a phase current is near zero at every level; large swings.
+LITTLE_VOLTAGE = [("saturated", 126), ("linear", 138), ("hsm1", 105)]
 # Machine, seed, electrical degrees: the last three are among the five of 40 machines that move most.
 SWINGS = [("pmasynrm", 107, 0.8), ("hsm1", 110, 1.2), ("hsm1", 120, 1.1), ("leaf", 114, 1.2), ("saturated", 116, 1.0)]
 R_LEFT, LEG_V = 0.004, 0.05  # beyond the sensors' gains; 5 mV of 1.2 V; a half per cent of what a leg loses

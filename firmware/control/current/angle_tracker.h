@@ -69,17 +69,6 @@ static inline void angle_tracker_move(const angle_tracker_config_t *config, angl
  * tracker continues at the speed before it. theta_e: electrical angle of the sample. */
 angle_t angle_tracker_coast(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_e);
 
-/** The advance of the tracked angle per period, with the correction by this sample (AT-22): while the rotor
- * accelerates, the speed lags behind it, this does not. It has more of the noise of the angle. theta_e, step: results
- * for this sample. k_p e is up to k_p^2 too small. */
-static inline int32_t angle_tracker_advance(const angle_tracker_config_t *config, const angle_tracker_state_t *state,
-                                            uint32_t theta_e, int32_t step)
-{
-    const uint32_t uncorrected = theta_e + (uint32_t)step - state->predicted; /* (1 - k_p) e */
-    const uint32_t error = uncorrected + 2U * (uint32_t)fx_mulhi(config->kp, (int32_t)uncorrected);
-    return (int32_t)((uint32_t)step + 2U * (uint32_t)fx_mulhi(config->kp, (int32_t)error));
-}
-
 /** What a repeated reading of the sensor means. */
 typedef enum {
     ANGLE_FOLLOWED, /* the rotor stands, or turns by less than the sensor resolves */

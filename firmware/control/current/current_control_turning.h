@@ -39,7 +39,7 @@ typedef struct {
 typedef struct {
     current_control_in_t control;
     dq_q15_t i;
-    int32_t angle_step;  /* theta (CC-26) */
+    int32_t angle_step;  /* theta */
     int32_t psi_d_error; /* q15: identified flux minus the table's */
 } turning_control_in_t;
 

@@ -103,39 +103,6 @@ void test_a_ramp_is_tracked_without_a_speed_error_in_both_directions(void)
     }
 }
 
-/* By hand: with theta_k = a k^2/2 the rotor advances by a (k + 1/2) until the next sample. The speed lags behind it by
- * k_p e = k_p a/k_i (AT-7); of this, k_p^2 is left. */
-void test_the_advance_of_an_accelerating_rotor_does_not_lag(void)
-{
-    const double kp = from_q31(f.angle_tracker.kp);
-    for (int sign = -1; sign <= 1; sign += 2) {
-        state = (angle_tracker_state_t){0};
-        const int64_t a = sign * 3000; /* mechanical */
-        const int64_t last = 3000;
-        angle_t y = {0};
-        for (int64_t k = 0; k <= last; k++) {
-            y = step((uint32_t)(a * k * k / 2));
-        }
-        const double advance = 3.0 * (double)a * ((double)last + 0.5);
-        const double lag = advance - y.step;
-        TEST_ASSERT_DOUBLE_WITHIN(0.01, 1.0, lag * kp / (4.0 * 3.0 * (double)a));
-        const int32_t tracked = angle_tracker_advance(&f.angle_tracker, &state, y.theta_e, y.step);
-        TEST_ASSERT_DOUBLE_WITHIN(1.1 * kp * kp * fabs(lag) + 8.0, advance, tracked);
-    }
-}
-
-/* Neither at the start nor after a sample that was replaced is there a correction. */
-void test_without_a_correction_the_advance_is_the_step(void)
-{
-    const uint32_t advance = 20000000U;
-    for (uint32_t k = 0; k < 5; k++) {
-        const angle_t y = step_or_coast((k == 4U) ? 0x80000000U : k * advance);
-        TEST_ASSERT_EQUAL_INT(k == 4U, y.jumped);
-        TEST_ASSERT_INT_WITHIN((k < 2U || k == 4U) ? 0 : 64, y.step,
-                               angle_tracker_advance(&f.angle_tracker, &state, y.theta_e, y.step));
-    }
-}
-
 void test_a_speed_step_settles_with_both_poles_at_the_configured_bandwidth(void)
 {
     (void)step(0);

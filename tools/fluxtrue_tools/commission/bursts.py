@@ -30,25 +30,13 @@ REST_S = 0.005  # before a burst: the drive sees that the rotor stands
 TURN = 2.0 * math.pi
 CLOSER = 0.998  # times a bound: safely closer to zero, also in the firmware's steps of the current
 STEADY = 1e-6  # of a knee: a current that does not change in a period
-NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(5)  # of a normal distribution
-SHARES = _WEIGHTS / _WEIGHTS.sum()
-FAR = 6.0  # times the noise: beyond it no sign is uncertain
-
-
-def upward_bounds(low_A: Array, high_A: Array, by_A: float, closer: float = 1.0) -> tuple[Array, Array]:
-    """As shown_bounds(), of bursts that all begin upwards; the lower bound is at most closer times as far from 0."""
-    high = high_A + by_A
-    return np.maximum(low_A + by_A, -closer * high), high
 
 
 def shown_bounds(low_A: float, high_A: float, by_A: float) -> tuple[float, float]:
     """Bounds for currents that the sensors show larger by by_A. The firmware begins towards the bound that is further
     from zero, the upper one if both are as far: so that it begins in the same direction, the other one gives way."""
-    if high_A >= -low_A:
-        low, high = upward_bounds(np.array(low_A), np.array(high_A), by_A)
-    else:
-        high, low = (-each for each in upward_bounds(np.array(-high_A), np.array(-low_A), -by_A, CLOSER))
-    return float(low), float(high)
+    low, high = low_A + by_A, high_A + by_A
+    return (max(low, -high), high) if high_A >= -low_A else (low, min(high, -CLOSER * low))
 
 
 @dataclass(frozen=True)
@@ -341,22 +329,9 @@ def mean_share(begins: Array, ends: Array, knee_A: float) -> Array:
     return np.where(steady, leg_share(0.5 * (begins + ends), knee_A), means)
 
 
-def expected_share(i: Array, knee_A: float, noise_A: float) -> Array:
-    """mean_share() of each period between two samples, over what the currents may have been: (CM-50). Where noise hides
-    a sign, that of the sample is too certain, and the others seem to have a knee."""
-    means = mean_share(i[:-1], i[1:], knee_A)
-    if noise_A > 0.0:
-        smaller = np.minimum(np.abs(i[:-1]), np.abs(i[1:]))
-        near = np.flatnonzero((smaller < FAR * noise_A) | (i[:-1] * i[1:] < 0.0))
-        begins, ends = np.broadcast_arrays(i[near, None, None] + noise_A * NODES[:, None],
-                                           i[near + 1, None, None] + noise_A * NODES)  # fmt: skip
-        means[near] = np.sum(np.outer(SHARES, SHARES) * mean_share(begins, ends, knee_A), axis=(1, 2))
-    return means
-
-
-def of_legs(i_s: Array, knee_A: float, noise_A: float = 0.0) -> Array:
+def of_legs(i_s: Array, knee_A: float) -> Array:
     """The vector of three legs that lose 1 V at large currents: means over each period."""
-    return _three_legs(i_s, lambda i: expected_share(i, knee_A, noise_A))
+    return _three_legs(i_s, lambda i: mean_share(i[:-1], i[1:], knee_A))
 
 
 def _sum(means: Array, period_s: float) -> Array:
@@ -364,13 +339,10 @@ def _sum(means: Array, period_s: float) -> Array:
     return period_s * np.concatenate(([0.0], np.cumsum(means)))
 
 
-def level_linkage(raw: Raw, knee_A: float, noise_A: float = 0.0) -> Array:
-    """What the legs' voltage adds to the flux linkage for each volt that is not compensated, in the rotor frame.
-
-    noise_A   standard deviation of a current's component
-    """
+def level_linkage(raw: Raw, knee_A: float) -> Array:
+    """What the legs' voltage adds to the flux linkage for each volt that is not compensated, in the rotor frame."""
     i_s = raw.i * np.exp(1j * raw.theta)
-    return np.asarray(-_sum(of_legs(i_s, knee_A, noise_A), raw.period_s) * np.exp(-1j * raw.theta))
+    return np.asarray(-_sum(of_legs(i_s, knee_A), raw.period_s) * np.exp(-1j * raw.theta))
 
 
 def integrate(raw: Raw, r_ohm: float, knee_A: float = 0.0) -> Linkage:

@@ -29,8 +29,7 @@ RESOLUTION_V = 0.005  # rms: what a mean voltage is certain to beyond the noise
 TRIES = 3
 QUIET_RAD = 0.07  # electrical: a level that moved the rotor further is repeated, (CM-26) has the guess of psi_f
 KNEES, KNEE_STEPS = (1e-4, 0.02), 24  # of the largest level: where the legs' knee is looked for
-KNEE_LOG = 0.01  # accuracy of the logarithm of the knee
-EXPLAINS = 0.01  # of the residuals' sum of squares: more than a knee removes by chance
+EXPLAINS = 0.01  # of the residuals' sum of squares: twice what a knee removes by chance
 NEAR = 1.05  # for the slope over the knee
 COMMON = 3  # unknowns of all levels
 LEAST_PERIODS = 100  # at a level
@@ -114,8 +113,7 @@ class _Level:
 class _Equations:
     """(CM-12) of all levels. The common unknowns: resistance, voltage of a leg, error of the mean voltage."""
 
-    def __init__(self, raws: Sequence[Raw], noises: Sequence[Noise], psi_f_Vs: float, noise_A: float) -> None:
-        self._noise_A = noise_A
+    def __init__(self, raws: Sequence[Raw], noises: Sequence[Noise], psi_f_Vs: float) -> None:
         self.levels = [_Level(raw, noise) for raw, noise in zip(raws, noises, strict=True)]
         self._of_r = self._all(lambda level: -level.linkage.of_r.real)
         self._seconds = self._all(lambda level: level.seconds)
@@ -129,7 +127,7 @@ class _Equations:
 
     def rows(self, knee_A: float) -> Array:
         """A column for each common unknown."""
-        of_level = self._all(lambda level: -level_linkage(level.raw, knee_A, self._noise_A).real)
+        of_level = self._all(lambda level: -level_linkage(level.raw, knee_A).real)
         return np.column_stack((self._of_r, of_level, self._seconds))
 
     def solve(self, rows: Array) -> tuple[Array, float]:
@@ -147,8 +145,7 @@ class _Equations:
 
         logs = np.log(largest_A * np.geomspace(*KNEES, KNEE_STEPS))
         best = min(range(1, len(logs) - 1), key=lambda k: left(logs[k]))
-        found = minimize_scalar(left, bounds=(logs[best - 1], logs[best + 1]), method="bounded",
-                                options={"xatol": KNEE_LOG})  # fmt: skip
+        found = minimize_scalar(left, bounds=(logs[best - 1], logs[best + 1]), method="bounded")
         (sharp, sharp_left), (soft, _) = (self.solve(self.rows(knee_A)) for knee_A in (0.0, math.exp(found.x)))
         shows = found.fun < (1.0 - EXPLAINS) * sharp_left and abs(soft[0] - sharp[0]) * largest_A > RESOLUTION_V
         return math.exp(found.x) if shows else 0.0
@@ -170,7 +167,7 @@ def _noises(raws: Sequence[Raw], noise_A: float, psi_f_Vs: float, angle_rad: flo
     """Where a ripple touches zero from one side, noise shifts the mean sign in one direction: the error is one of the
     whole level, as that of the angle. A first solution without them says how large all other errors are."""
     plain = [Noise(np.ones(len(raw.i)), np.zeros((len(raw.i), 0))) for raw in raws]
-    first = _Equations(raws, plain, psi_f_Vs, noise_A)
+    first = _Equations(raws, plain, psi_f_Vs)
     x, left = first.solve(first.rows(0.0))
     sigma = math.sqrt(left / first.spare)
     noises = []
@@ -189,7 +186,7 @@ def solve(raws: list[Raw], psi_f_Vs: float, compensated_V: float = 0.0, noise_A:
     noise_A         standard deviation of a current's component
     angle_rad       the same of the angle where the rotor stands
     """
-    equations = _Equations(raws, _noises(raws, noise_A, psi_f_Vs, angle_rad), psi_f_Vs, noise_A)
+    equations = _Equations(raws, _noises(raws, noise_A, psi_f_Vs, angle_rad), psi_f_Vs)
     means = np.array([(raw.i.real.mean(), raw.u.real.mean()) for raw in raws])
     largest_A = float(np.abs(means[:, 0]).max())
     knee_A = equations.knee_A(largest_A)

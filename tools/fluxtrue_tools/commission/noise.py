@@ -8,9 +8,10 @@ its leg is uncertain for a period, and all later flux linkages of the burst cont
 import numpy as np
 from scipy import linalg
 
-from fluxtrue_tools.commission.bursts import NODES, SHARES, Raw, mean_sign
+from fluxtrue_tools.commission.bursts import Raw, mean_sign
 from fluxtrue_tools.motor.flux_model import Array
 
+NODES, SHARES = np.polynomial.hermite_e.hermegauss(5)  # of a normal distribution
 CERTAIN = 1e-3  # variance of a sign that is known
 
 
@@ -18,7 +19,7 @@ def sign_variance(i: Array, noise_A: float) -> Array:
     """Of the mean sign of each period between two samples of a current, each with its own noise."""
     begins = i[:-1, None, None] + noise_A * NODES[:, None]
     ends = i[1:, None, None] + noise_A * NODES
-    signs, shares = mean_sign(begins, ends), np.outer(SHARES, SHARES)
+    signs, shares = mean_sign(begins, ends), np.outer(SHARES, SHARES) / SHARES.sum() ** 2
     means = np.sum(shares * signs, axis=(1, 2))
     return np.asarray(np.sum(shares * signs**2, axis=(1, 2)) - means**2)
 

@@ -47,7 +47,7 @@ def turned_text(found: Turned) -> str:
 
 
 def dc_zero_text(found: DcZero, truth: Truth) -> str:
-    """The error of the dc-voltage sensor's offset, or why there is none: it is then not an error of this step."""
+    """The error of the dc-voltage sensor's offset, or why there is none: what is left then is no error of a step."""
     said = (f"not found: {found.unknown}" if found.unknown else
             f"{100.0 * dc_zero_error(found, truth):+.3f} % of the full scale")  # fmt: skip
     return f"offset of the dc voltage's sensor: {said}"

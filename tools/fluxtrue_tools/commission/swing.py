@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from fluxtrue_tools.commission.bursts import CLOSER, upward_bounds
+from fluxtrue_tools.commission.bursts import CLOSER
 from fluxtrue_tools.commission.drive import nothing
 from fluxtrue_tools.commission.rule import Rule
 from fluxtrue_tools.motor.flux_model import Array
@@ -123,7 +123,7 @@ def course(of: Machine, volts: float, waves: Sequence[Waves], drift: Drift, sign
     low, high, first = (np.array([getattr(each, name) for each in waves])[:, None] * np.ones((1, DRAWS))
                         for name in ("low_A", "high_A", "first"))  # fmt: skip
     offset = sign * of.offset_A
-    rule = Rule(*upward_bounds(low, high, offset), first, REVERSALS)
+    rule = Rule(np.maximum(low + offset, -high - offset), high + offset, first, REVERSALS)  # shown_bounds()
     gain = of.period_s * volts * (1.0 + UNCERTAIN * rng.standard_normal((1, DRAWS)))
     drifts = 1.0 + UNCERTAIN_DRIFT * rng.standard_normal((1, DRAWS))
     beyond = np.maximum(1.0 + UNCERTAIN_BEYOND * rng.standard_normal((1, DRAWS)), LEAST_BEYOND)
