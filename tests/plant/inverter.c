@@ -1,15 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "inverter.h"
 
+#include "clamp.h"
 #include "flux_solve.h"
 
 #define SWEEPS 60
 #define SWEEP_END_V 1e-7
-
-static double clamp(double x, double lo, double hi)
-{
-    return x < lo ? lo : (x > hi ? hi : x);
-}
 
 static void voltage(const inverter_t *v, double vdc_V, const double error_V[3], double u_s[2])
 {

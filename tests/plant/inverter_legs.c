@@ -2,6 +2,8 @@
 /* Duty and error bounds of each leg in a period: intact, with an open or a shorted switch, with a broken motor lead. */
 #include "inverter.h"
 
+#include "clamp.h"
+
 #define UPPER(x) (x)
 #define LOWER(x) ((x) + 3)
 
@@ -9,11 +11,6 @@
 #define SWITCHING_ZONE_A 0.05
 /* Error bound of a broken lead: larger than any voltage, so that its current stays zero. */
 #define OPEN_LEAD_V 1e6
-
-static double clamp(double x, double lo, double hi)
-{
-    return x < lo ? lo : (x > hi ? hi : x);
-}
 
 static double duty_of(double duty)
 {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "sensors.h"
 
+#include "clamp.h"
 #include "mechanics.h"
 
 #include <math.h>
@@ -16,11 +17,6 @@
 #define LENGTH_CHANGE 0.03
 #define POINT_FOLLOW (1.0 / 64.0 / 16384.0) /* in a sample */
 #define WRONG_SAMPLES_OF_A_FAILURE 3
-
-static double clamp(double x, double lo, double hi)
-{
-    return x < lo ? lo : (x > hi ? hi : x);
-}
 
 void sensors_create(sensors_t *s, const plant_params_t *p)
 {
