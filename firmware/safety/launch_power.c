@@ -18,6 +18,7 @@
 #define SLOW_STEPS 4      /* between two movements of a reference that is followed */
 #define HALF_ROOT_Q8 181
 #define VAGUE_Q8 384 /* r_0 of 1.5 thresholds */
+#define ROUNDING 1   /* both powers and the threshold are whole counts, rounded down */
 #define NOISE_LIMIT UINT16_MAX
 #define NOISE_MAX 8 /* times v_1: largest noise of one step, as the currents may change without the reference */
 
@@ -173,7 +174,7 @@ static bool is_wrong(const launch_power_config_t *config, const launch_power_sta
     const int32_t psi = config->psi_share + (fx_abs_q15(in->psi_ref.q) >> 3);
     const int32_t of_tables = times(2 * times(omega, psi), current);
     const int32_t change = fx_abs_q31((state->power_q8 - state->first_power_q8) >> 8);
-    return current > config->i_min && change > times(config->v_1, current) + of_tables &&
+    return current > config->i_min && change > times(config->v_1, current) + of_tables + ROUNDING &&
            change > noise_of_change(state) + of_tables;
 }
 

@@ -14,8 +14,8 @@
  *   a reference that moves by i_0 slowly, from i to i': m_0 += m_0 (i' - i)/i + r i' (i' - i), and
  *   r_0 += r_0 (i' - i)/i + |i' - i| (r_error i' + v_1)/sqrt(2); begun anew where it has not moved by i_0
  *   for 32 steps, with r_0 > 2 r and r_0 > 1.5 |i*| v_1
- *   |m - m_0| > max(|i*| v_1, sqrt(2 r^2 + 2 r_0^2)) + |i*| |n - n_0|(psi_f/5 + |psi_q|/8) in a row of steps; no check
- *   below |i*| = i_min
+ *   |m - m_0| > max(|i*| v_1 + 1 count, sqrt(2 r^2 + 2 r_0^2)) + |i*| |n - n_0|(psi_f/5 + |psi_q|/8) in a row of
+ *   steps; no check below |i*| = i_min
  * Source   docs/theory/monitors.md (MN-28), (MN-29), (MN-39), (MN-57)
  * Units    voltages and speeds per unit times the periods of a step, angle 2^32 = one turn
  * Range    |u| <= 43 * 2^15, as of 40 periods and 1/(w_b T_s) = 3; 4 i_0 <= i_min; every other argument

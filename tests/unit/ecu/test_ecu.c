@@ -490,14 +490,14 @@ void test_the_second_level_takes_counts_and_angle_of_the_same_period(void)
     TEST_ASSERT_GREATER_THAN_INT32(0, ecu.second_level.mean_q8);
 }
 
-/* 0.37 of full scale in the q axis without any request, of which the first level's scaling knows nothing: 19 steps for
+/* 0.37 of full scale in the q axis without any request, of which the first level's scaling knows nothing: 29 steps for
  * the mean and the confirmation, and one step until the drive has latched the fault. */
 void test_torque_that_no_frame_permits_is_a_fault_of_the_drive(void)
 {
     sample_t *sample = &ecu.drive.samples.slot[ecu.drive.samples.generation % SAMPLE_SLOTS];
     sample->acting = true;
     board.converted = (current_counts_t){2048, 2048 + 650, 2048 - 650};
-    for (int n = 0; n < 20; n++) {
+    for (int n = 0; n < 30; n++) {
         ecu_task_1khz(&ecu);
     }
     TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE, ecu.drive.request.faults);

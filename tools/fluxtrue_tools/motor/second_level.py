@@ -17,7 +17,7 @@ ROWS, COLUMNS, PARTS = 18, 17, 16  # as firmware/second_level/constants.h
 TABLE = "torque"
 SLOWEST_S = 0.04  # zero to full torque, by the arbitration of the first level
 HOLD_S, HOLDS = 0.02, 4  # jerk 10 ms, a cycle of the task, the answer of the currents, the mean
-CONFIRM_S, MEAN_SHIFT = 0.015, 2
+CONFIRM_S, MEAN_SHIFT = 0.025, 2
 TOLERANCE_SHARE_OF_MONITOR, TOLERANCE_SHARE = 0.6, 1 / 64
 STANDSTILL_SHARE = 0.025  # of maximum speed
 
