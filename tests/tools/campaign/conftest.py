@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from in_process import fluxtrue
 
 from fluxtrue_tools.campaign.machine import Machine, make_machine
 from fluxtrue_tools.campaign.spec import Campaign, parse
@@ -55,6 +56,5 @@ def environment() -> dict[str, str]:
 
 
 def campaign(*arguments: object, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    """The command as a user calls it."""
-    return subprocess.run(command(*arguments), capture_output=True, text=True, cwd=cwd,
-                          env=environment(), check=False)  # fmt: skip
+    """The command, finished."""
+    return fluxtrue("campaign", *arguments, cwd=cwd)

@@ -2,12 +2,12 @@
 """A valid motor folder for tests to change, and the command line to run on it."""
 
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from in_process import fluxtrue
 
 ROOT = Path(__file__).resolve().parents[3]
 MOTORS = ROOT / "firmware" / "motors"
@@ -70,11 +70,10 @@ def write(folder: Path) -> Callable[..., Path]:
 
 @pytest.fixture
 def cli() -> Callable[..., subprocess.CompletedProcess[str]]:
-    """The real command line in a process of its own."""
+    """`fluxtrue motor`, finished."""
 
     def _run(*arguments: object) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "fluxtrue_tools", "motor", *map(str, arguments)]
-        return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+        return fluxtrue("motor", *arguments, cwd=ROOT)
 
     return _run
 

@@ -2,15 +2,14 @@
 """motor import as a whole: a motor folder that motor build accepts, or nothing; what was changed is said."""
 
 import csv
-import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import FULL, HALF, HSM1, POLE_PAIRS, ROOT, SETTINGS, Importer, polar, psi, torque, written
+from in_process import fluxtrue
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor import doubts
@@ -22,9 +21,8 @@ HEADER = "i_d,i_q,psi_d,psi_q,torque"
 
 
 def command(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """The real command line in a process of its own."""
-    line = [sys.executable, "-m", "fluxtrue_tools", "motor", *map(str, arguments)]
-    return subprocess.run(line, capture_output=True, text=True, cwd=ROOT, check=False, env=dict(os.environ))
+    """`fluxtrue motor`, finished."""
+    return fluxtrue("motor", *arguments, cwd=ROOT)
 
 
 def given(*texts: str) -> list[str]:
