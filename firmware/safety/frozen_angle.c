@@ -7,7 +7,7 @@
 #include "signal/mean.h"
 #include "types/faults.h"
 
-#define STANDING_ANGLE (1U << 25) /* 1/128 of a turn, 2.8 degrees */
+#define STANDING_ANGLE (1U << 24) /* 1/256 of a turn, 1.4 degrees */
 #define UNCERTAIN 8 /* times v_0: the voltage of a leg without current is uncertain by +- the whole dead time */
 #define MOVING_STEPS 4 /* after a change: the mean is the present value, without the voltage of the transient */
 #define MEAN_SHIFT 2
