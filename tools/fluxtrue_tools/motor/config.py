@@ -13,7 +13,7 @@ from fluxtrue_tools.motor.names import FILE_NAME
 from fluxtrue_tools.strict import Strict
 
 TRIP_PER_I_MAX = 1.2
-TRIP_PER_FULL_SCALE = 0.78  # documented in bring-your-motor.md: below 80 % of the converter's range
+TRIP_PER_FULL_SCALE = 0.78  # the trip is below 80 % of the converter's range
 FULL_SCALE_PER_I_MAX = 1.35  # leaves 5 % between i_max and the trip for noise and overshoot
 SLEW_PER_TORQUE_MAX = 100.0  # 1/s
 THERMAL_SPAN_MIN_K = 5.0
