@@ -31,7 +31,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FAILED = pytest.StashKey[bool]()
 AT_REST, FAULTED = ("standby", "ready", "discharge"), ("fault", "safe state")
 INVERTER_C = 40.0  # of a virtual ECU that has just been started
-CHROMIUM, DRIVER = Path("/usr/bin/chromium"), Path("/usr/bin/chromedriver")
+CHROMIUM, DRIVER = Path("/usr/bin/chromium-headless-shell"), Path("/usr/bin/chromedriver")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -171,12 +171,12 @@ def replay(tmp_path: Path) -> Iterator[Callable[[Path], Server]]:
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[webdriver.Chrome]:
-    """Debian's Chromium, headless."""
+    """Debian's Chromium in its build without windows: it takes three quarters of the processor time of the other."""
     if not (CHROMIUM.exists() and DRIVER.exists()):
-        pytest.skip("needs the Debian packages chromium and chromium-driver")
+        pytest.skip("needs the Debian packages chromium-headless-shell and chromium-driver")
     options = webdriver.ChromeOptions()
     options.binary_location = str(CHROMIUM)
-    for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu",
+    for argument in ("--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu",
                      "--window-size=1440,960", "--force-device-scale-factor=1"):  # fmt: skip
         options.add_argument(argument)
     driver = webdriver.Chrome(options=options, service=Service(str(DRIVER)))

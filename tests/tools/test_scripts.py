@@ -94,8 +94,8 @@ def test_without_network_the_missing_package_is_named(checkout: Path, bare_path:
 def install(checkout: Path, bare_path: Path) -> Path:
     """Put all in place that tools/test needs; the list of what apt is asked."""
     asked = checkout / "asked"
-    for name in ("ninja", "ruby", "clang", "chromium", "chromedriver", "gcc", "arm-none-eabi-gcc", "qemu-system-arm",
-                 "riscv64-unknown-elf-gcc", "x86_64-w64-mingw32-gcc"):  # fmt: skip
+    for name in ("ninja", "ruby", "clang", "chromium-headless-shell", "chromedriver", "gcc", "arm-none-eabi-gcc",
+                 "qemu-system-arm", "riscv64-unknown-elf-gcc", "x86_64-w64-mingw32-gcc"):  # fmt: skip
         stub(bare_path, name, "cat >/dev/null")  # what is compiled to see whether a compiler has its library
     stub(bare_path, "dpkg", "echo amd64")
     stub(bare_path, "apt-get", f'echo "$@" >> "{asked}"; exit 100')
