@@ -11,7 +11,7 @@ Source  de Boor's recursion in FITPACK's fpbspl, the sum over the cell's 16 coef
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RectBivariateSpline
 
 Array = NDArray[np.float64]
@@ -77,10 +77,14 @@ class Bicubic:
             self._coefficients[nx, ny] = np.ascontiguousarray(spline.get_coeffs()).reshape(rows, -1)
         return self._coefficients[nx, ny]
 
+    def few(self, x: ArrayLike, y: ArrayLike, nx: int, ny: int) -> Array:
+        """The derivative of these orders at a few points within the knots, by FITPACK itself."""
+        return np.asarray(self.spline.ev(x, y, dx=nx, dy=ny))
+
     def __call__(self, x: Array, y: Array, nx: int, ny: int) -> Array:
         """The derivative of these orders, up to 2, at points within the knots."""
         if x.size < MANY:
-            return np.asarray(self.spline.ev(x, y, dx=nx, dy=ny))
+            return self.few(x, y, nx, ny)
         axes = (self.place.axis(0, self.knots_x, x.flatten()), self.place.axis(1, self.knots_y, y.flatten()))
         parts = zip(*(axis.levels for axis in axes), strict=True)
         table = self._of(nx, ny)

@@ -50,6 +50,8 @@ class _Surface:
         self._box = (x[0], x[-1], y[0], y[-1])
 
     def __call__(self, x: ArrayLike, y: ArrayLike, nx: int, ny: int) -> Array:
+        if isinstance(x, float) and isinstance(y, float) and self._holds(x, y):
+            return self._spline.few(x, y, nx, ny)  # a plant in Python asks for one point at a time, often
         xa, ya = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
         xc, yc = np.clip(xa, self._box[0], self._box[1]), np.clip(ya, self._box[2], self._box[3])
         z = self._spline(xc, yc, nx, ny)
@@ -57,6 +59,10 @@ class _Surface:
         if (nx, ny) == (0, 0) and np.any(beyond):
             z = z + (xa - xc) * self._spline(xc, yc, 1, 0) + (ya - yc) * self._spline(xc, yc, 0, 1)
         return np.asarray(z, dtype=np.float64)
+
+    def _holds(self, x: float, y: float) -> bool:
+        left, right, low, high = self._box
+        return bool(left <= x <= right and low <= y <= high)
 
 
 def _refine(axis: Array, values: Array, along: int, parts: int) -> tuple[Array, Array]:
