@@ -25,7 +25,8 @@ MEASURED, GIVEN, GUESSED = 0.01, 0.1, 0.5  # errors of the magnet's flux linkage
 ERROR, STEADY = 0.05, 0.5  # of psi, rms, and of i_max: until there is a map, a sample's error is ERROR/(STEADY + i)
 RESOLUTION = 0.001  # of psi, rms: error of a sample beside its noise
 R_PRIOR, LEVEL_PRIOR_V, START_PRIOR = 0.002, 0.1, 0.05  # of R; volts; of psi, rms
-PRICE, LEAST = 1.4, 0.01  # of an unknown in the score of the smoothing; the least smoothing
+PRICE, LEAST = 1.4, 1.0  # of an unknown in the score of the smoothing; the least smoothing
+RASTER = 49  # values of each current from 0 to i_max at which both flux linkages must rise
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,19 @@ def _parts(values: Array) -> Array:
     return np.concatenate((values.real, values.imag))
 
 
+class Rising:
+    """(CM-50): whether each flux linkage rises with its own current, in the whole rectangle of the map."""
+
+    def __init__(self, basis: Basis) -> None:
+        u_d, u_q = np.meshgrid(np.linspace(-1.0, 0.0, RASTER), np.linspace(0.0, 1.0, RASTER))
+        self.count = basis.count
+        self.slopes = sparse.vstack([basis.rows(u_d.ravel(), u_q.ravel(), *order) for order in ((2, 0), (0, 2))])
+
+    def __call__(self, x: Array) -> bool:
+        """Of a solution that begins with the coefficients of the energy."""
+        return bool(np.all(self.slopes @ x[: self.count] > 0.0))
+
+
 class _Fit:
     """Rows of all bursts; the unknowns are scaled so that each is about 1."""
 
@@ -89,6 +103,7 @@ class _Fit:
         zero = np.zeros(1)
         self.magnet = self.basis.rows(zero, zero, 1, 0)
         self.zero = self.basis.rows(zero, zero, 0, 0)
+        self.rising = Rising(self.basis)
         self.others = 2 + 2 * len(raws)
         self.rows = [self._rows(n) for n in range(len(raws))]
 
@@ -156,7 +171,7 @@ class _Fit:
         system.add(prior, centre, counted=False)
         penalty = np.zeros((count + self.others,) * 2)
         penalty[:count, :count] = self.basis.penalty()
-        return system.solve(penalty, slack=1.0, price=PRICE, least=LEAST)
+        return system.solve(penalty, slack=1.0, price=PRICE, least=LEAST, accepted=self.rising)
 
 
 def fit(raws: Sequence[Raw], noise_A: float, i_max_A: float, r_ohm: float, magnet: tuple[float, float],

@@ -14,6 +14,7 @@ to the other component of the flux, the one along the current. Errors at small c
 of the magnet alone and the torque per ampere stay as well.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -134,14 +135,14 @@ class System:
         self.power += float(values @ values)
         self.total += len(values) if counted else 0
 
-    def solve(
-        self, penalty: Array, slack: float = SCORE_SLACK, price: float = 1.0, least: float = 0.0
-    ) -> tuple[float, Array]:
+    def solve(self, penalty: Array, slack: float = SCORE_SLACK, price: float = 1.0, least: float = 0.0,
+              accepted: Callable[[Array], bool] = lambda _: True) -> tuple[float, Array]:  # fmt: skip
         """Effective unknowns and solution, with the smoothing that generalised cross-validation chooses.
 
-        slack   of its score, for the least smoothing that is taken instead of the best
-        price   of an effective unknown in the score, in equations
-        least   smoothing that is a candidate
+        slack      of its score, for the least smoothing that is taken instead of the best
+        price      of an effective unknown in the score, in equations
+        least      smoothing that is a candidate
+        accepted   solutions, of which the best is taken; the best of all if there is none
         """
         penalty = penalty * (np.trace(self.matrix) / np.trace(penalty))
         size = len(self.matrix)
@@ -157,6 +158,7 @@ class System:
             unknowns = float(np.sum(gains * np.maximum(1.0 - MIDDLE * stiffness, 0.0)))
             error = max(self.power - float(2.0 * x @ self.right - x @ self.matrix @ x), 0.0) + NOISE_MIN**2 * self.power
             found.append((error / max(self.total - price * unknowns, 1.0) ** 2, unknowns, x))
+        found = [one for one in found if accepted(one[2])] or found
         best = min(score for score, _, _ in found)
         return next((unknowns, x) for score, unknowns, x in found if score <= slack * best)
 
