@@ -16,6 +16,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from in_process import fluxtrue
 from load_table import IDENTIFICATIONS, load_row
 from planting import PlantedError, relinked, with_error, with_motor
 
@@ -132,7 +133,7 @@ def test_a_machine_is_checked_with_the_sensor_of_its_image_before_it_is_linked(h
     assert own is not None
     for motor, refused in ((own[0], False), (_motor(40).folder.folder / "motor.json", angle not in SHORTEST)):
         words = shlex.split(command.replace(own[0], str(motor)))
-        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        done = fluxtrue(*words[words.index("fluxtrue_tools") + 1 :], cwd=folder)
         assert (done.returncode != 0) == refused, done.stdout + done.stderr
         assert f"with the angle sensor {angle}," in done.stdout + done.stderr
 
